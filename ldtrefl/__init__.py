@@ -1,0 +1,58 @@
+"""ldtrefl: specular reflections on curved objects by layered depth textures, beside the ray-traced truth.
+
+The pipeline, one module a stage:
+
+    scene file -> Scene (scene, shapes, mesh) -> arrays on the device (device_scene)
+      -> G-buffer: what the camera sees (gbuffer, raster)
+      -> a method (methods/): its tracer answers reflected rays (trace), whose life is written once (reflect)
+           ldt: cull (cull), peel on first need (peel -> ldt, fragments), march (march)
+           bvh: the ground truth (raycast)
+      -> shade, the same functions for all (shade) -> composite (render) -> image (image), compared (metrics)
+"""
+
+from ldtrefl.errors import InputError
+from ldtrefl.image import load_image, save_image
+from ldtrefl.launch import Stats, set_threads
+from ldtrefl.ldt import LayeredDepthTexture
+from ldtrefl.mesh import Mesh, load_mesh
+from ldtrefl.peel import peel
+from ldtrefl.raycast import Raycaster
+from ldtrefl.render import Frame, Renderer, render
+from ldtrefl.scene import (
+    Camera,
+    Environment,
+    Light,
+    Lighting,
+    Material,
+    Object,
+    Reflection,
+    Scene,
+    load_scene,
+)
+from ldtrefl.trace import Hits
+
+__all__ = [
+    "Camera",
+    "Environment",
+    "Frame",
+    "Hits",
+    "InputError",
+    "LayeredDepthTexture",
+    "Light",
+    "Lighting",
+    "Material",
+    "Mesh",
+    "Object",
+    "Raycaster",
+    "Reflection",
+    "Renderer",
+    "Scene",
+    "Stats",
+    "load_image",
+    "load_mesh",
+    "load_scene",
+    "peel",
+    "render",
+    "save_image",
+    "set_threads",
+]

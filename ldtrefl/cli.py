@@ -1,0 +1,333 @@
+"""The command line, and nothing else.
+
+Exit status: 0 done, 2 the input is wrong (one line on standard error), 1 anything else.
+"""
+
+import json
+import os
+import sys
+import tempfile
+import time
+import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+from typer.exceptions import TyperException
+
+from ldtrefl import launch, metrics, shapes
+from ldtrefl.device_scene import DeviceMesh
+from ldtrefl.errors import InputError
+from ldtrefl.image import check_writable, difference_image, save_image
+from ldtrefl.layers import draw_layers
+from ldtrefl.mesh import Mesh, load_mesh
+from ldtrefl.methods import all_methods, find_method
+from ldtrefl.peel import DEFAULT_RESOLUTION, peel_mesh
+from ldtrefl.render import Frame, Renderer
+from ldtrefl.scene import Scene, load_scene
+
+PROGRESS_AFTER = 1.0
+"""Seconds before a progress bar is shown."""
+
+TEXEL_RESOLUTION = 256
+"""Map resolution whose texel is the unit of distance errors for methods without maps."""
+
+app = typer.Typer(
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    no_args_is_help=False,
+    help="Reflections on curved objects by layered depth textures, compared with ray tracing.",
+)
+
+SceneFile = Annotated[Path, typer.Argument(metavar="SCENE", help="A scene file (TOML).")]
+Settings = Annotated[
+    list[str] | None, typer.Option("--set", metavar="OPTION=VALUE", help="An option of the method; may be repeated.")
+]
+Device = Annotated[str | None, typer.Option(help="'cpu' (default) or a CUDA device such as 'cuda:0'.")]
+Threads = Annotated[int | None, typer.Option(help="CPU threads; all cores if not given.")]
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the command line; the exit status."""
+    try:
+        result = app(arguments, standalone_mode=False, prog_name="ldtrefl")
+    except (InputError, TyperException) as error:
+        message = error.format_message() if isinstance(error, TyperException) else str(error)
+        print(f"ldtrefl: {' '.join(message.split())}", file=sys.stderr)
+        return 2
+    except typer.Abort:
+        return 1
+    except KeyboardInterrupt:
+        return 130
+    except BrokenPipeError:
+        # The reader of our output has gone, as in `| head`; nothing is left to say to it.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    return result if isinstance(result, int) else 0
+
+
+@app.command()
+def render(
+    scene: SceneFile,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="PNG or EXR; SCENE's name with .png if not given.")
+    ] = None,
+    method: Annotated[str | None, typer.Option(help="See `ldtrefl methods`; the scene's own if not given.")] = None,
+    settings: Settings = None,
+    device: Device = None,
+    threads: Threads = None,
+) -> None:
+    """Render a scene to a picture."""
+    launch.set_threads(threads)
+    path = check_writable(output or Path(scene.stem + ".png"))
+    loaded = load_scene(scene)
+    with _progress():
+        frame = Renderer(loaded, method, device, **_options(settings)).render()
+        save_image(path, frame.image)
+    total = sum(frame.stats.seconds.values())
+    _console().print(f"{path}: {frame.image.shape[1]} x {frame.image.shape[0]} in {total:.2f} s", _stages(frame))
+
+
+@app.command()
+def compare(
+    scene: SceneFile,
+    methods: Annotated[str, typer.Option(help="Method names, comma-separated.")] = "ldt,envmap",
+    reference: Annotated[str, typer.Option(help="The method that counts as the truth.")] = "bvh",
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Folder for images; SCENE's name + '-compare' if not given.")
+    ] = None,
+    settings: Annotated[
+        list[str] | None, typer.Option("--set", metavar="METHOD.OPTION=VALUE", help="An option of one method.")
+    ] = None,
+    device: Device = None,
+    threads: Threads = None,
+) -> None:
+    """Render a scene by several methods; print errors and write images and difference pictures."""
+    launch.set_threads(threads)
+    names = [name.strip() for name in methods.split(",") if name.strip()]
+    options = _method_options(settings, [reference, *names])
+    folder = _writable_folder(output or Path(scene.stem + "-compare"))
+    loaded = load_scene(scene)
+    rows: dict[str, dict[str, Any]] = {}
+    with _progress():
+        _, truth = _timed_frame(loaded, reference, device, options.get(reference, {}))
+        save_image(folder / f"{reference}.png", truth.image)
+        for name in names:
+            renderer, frame = _timed_frame(loaded, name, device, options.get(name, {}))
+            resolution = options.get(name, {}).get("resolution", TEXEL_RESOLUTION)
+            rows[name] = _errors(frame, truth, renderer.texel_sizes(resolution))
+            save_image(folder / f"{name}.png", frame.image)
+            save_image(folder / f"{name}-difference.png", difference_image(frame.image, truth.image))
+    _write_text(folder / "compare.json", json.dumps(_finite({"scene": str(scene), "reference": reference, **rows})))
+    _console().print(_error_table(rows, f"{scene} against {reference} ({truth.reflector_mask.sum()} reflector pixels)"))
+    _console().print(f"{reference}: {sum(truth.stats.seconds.values()):.3f} s", _stages(truth))
+    _console().print(f"images in {folder}")
+
+
+@app.command()
+def peel(
+    mesh: Annotated[str, typer.Argument(metavar="MESH", help="A mesh file, or the name of a procedural shape.")],
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="Draw the layers to this picture.")] = None,
+    resolution: Annotated[int, typer.Option(help="Texels along the longest side.")] = DEFAULT_RESOLUTION,
+    device: Device = None,
+    threads: Threads = None,
+) -> None:
+    """Look at a layered depth texture: layers per face, fragments, bytes and time."""
+    launch.set_threads(threads)
+    path = None if output is None else check_writable(output)
+    target = launch.resolve_device(device)
+    geometry = DeviceMesh.upload(_mesh_or_shape(mesh), target)
+    peel_mesh(geometry, 16)  # compiles the kernels, so that the time below is peeling's own
+    start = time.perf_counter()
+    maps = peel_mesh(geometry, resolution)
+    seconds = time.perf_counter() - start
+    if path is not None:
+        save_image(path, draw_layers(maps))
+    console = _console()
+    console.print(f"{mesh}: {len(geometry.mesh.faces)} triangles at {' x '.join(map(str, maps.frame.size))} texels")
+    console.print("layers per face: " + ", ".join(f"{face} {count}" for face, count in maps.layers().items()))
+    console.print("crossings per axis: " + ", ".join(f"{axis} {count}" for axis, count in maps.crossings().items()))
+    console.print(f"fragments: {maps.fragment_count}, bytes: {maps.nbytes}, time: {1000 * seconds:.1f} ms")
+    if path is not None:
+        console.print(f"layers drawn to {path}")
+
+
+@app.command()
+def info(
+    file: Annotated[str, typer.Argument(metavar="SCENE|MESH", help="A scene or mesh file, or a shape's name.")],
+) -> None:
+    """Say what a scene or a mesh holds."""
+    if Path(file).suffix.lower() == ".toml":
+        _scene_info(load_scene(file))
+    else:
+        _mesh_info(_mesh_or_shape(file))
+
+
+@app.command()
+def methods() -> None:
+    """List every method and its options."""
+    console = _console()
+    for name, method in all_methods().items():
+        console.print(f"[bold]{name}[/bold]  {method.describe()}")
+        for option, (default, words) in method.options().items():
+            console.print(f"    {option} = {default!r}  {words}")
+
+
+def _console() -> Console:
+    # In a pipe there is no width to fit into: lines are not broken.
+    return Console(highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else 200)
+
+
+def _stages(frame: Frame) -> str:
+    return ", ".join(f"{name} {seconds:.3f}" for name, seconds in frame.stats.seconds.items())
+
+
+@contextmanager
+def _progress() -> Iterator[None]:
+    """A progress bar on standard error for what takes over a second; on a terminal only."""
+    if not sys.stderr.isatty():
+        yield
+        return
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    progress = Progress(*columns, console=Console(stderr=True), transient=True)
+    task = progress.add_task("starting", total=1.0)
+    begun = time.perf_counter()
+
+    def show(stage: str, fraction: float) -> None:
+        if time.perf_counter() - begun > PROGRESS_AFTER:
+            progress.start()
+        progress.update(task, description=stage, completed=fraction)
+
+    try:
+        with launch.progress_to(show):
+            yield
+    finally:
+        progress.stop()
+
+
+def _options(settings: list[str] | None) -> dict[str, Any]:
+    """``["resolution=256"]`` -> ``{"resolution": 256}``; values as in TOML, or else plain words."""
+    options: dict[str, Any] = {}
+    for setting in settings or []:
+        name, equals, value = setting.partition("=")
+        if not equals or not name.strip():
+            raise InputError(f"--set {setting}: expected OPTION=VALUE")
+        try:
+            options[name.strip()] = tomllib.loads(f"value = {value}")["value"]
+        except tomllib.TOMLDecodeError:
+            options[name.strip()] = value.strip()
+    return options
+
+
+def _method_options(settings: list[str] | None, names: list[str]) -> dict[str, dict[str, Any]]:
+    """``["ldt.resolution=256"]`` -> ``{"ldt": {"resolution": 256}}``, checked."""
+    options: dict[str, dict[str, Any]] = {}
+    for key, value in _options(settings).items():
+        method, dot, option = key.partition(".")
+        if not dot or method not in names:
+            raise InputError(f"--set {key}: expected METHOD.OPTION=VALUE, METHOD one of {', '.join(names)}")
+        options.setdefault(method, {})[option] = value
+    for name in names:
+        find_method(name).configured(options.get(name, {}))
+    return options
+
+
+def _timed_frame(scene: Scene, method: str, device: str | None, options: dict[str, Any]) -> tuple[Renderer, Frame]:
+    """A frame timed with all its stages: a first one compiles the kernels and is thrown away."""
+    Renderer(scene, method, device, **options).render()
+    renderer = Renderer(scene, method, device, **options)
+    return renderer, renderer.render()
+
+
+def _errors(frame: Frame, truth: Frame, texel_sizes: np.ndarray) -> dict[str, Any]:
+    mask = truth.reflector_mask
+    row: dict[str, Any] = {
+        "seconds": frame.stats.seconds,
+        "ssim": metrics.ssim(frame.image, truth.image, mask),
+        "psnr": metrics.psnr(frame.image, truth.image, mask),
+        "flip": metrics.flip(frame.image, truth.image, mask),
+        "relmse": metrics.relmse(frame.image, truth.image, mask),
+    }
+    if frame.hits is not None and truth.hits is not None:
+        row |= vars(metrics.hit_errors(frame.hits, truth.hits, texel_sizes, mask))
+    return row
+
+
+def _error_table(rows: dict[str, dict[str, Any]], title: str) -> Table:
+    table = Table(title=title)
+    heads = ("method", "seconds", "stages", "SSIM", "PSNR", "FLIP", "wrong hit %", "wrong miss %", "texels p50", "p99")
+    for head in heads:
+        table.add_column(head, justify="left" if head in ("method", "stages") else "right", overflow="fold")
+    formats = {"ssim": ".4f", "psnr": ".1f", "flip": ".4f", "wrong_hits": ".3f", "wrong_misses": ".3f"}
+    formats |= {"median": ".3f", "p99": ".2f"}
+    for name, row in rows.items():
+        stages = " ".join(f"{stage} {seconds:.3f}" for stage, seconds in row["seconds"].items())
+        figures = [format(row[key], spec) if key in row else "-" for key, spec in formats.items()]
+        table.add_row(name, f"{sum(row['seconds'].values()):.3f}", stages, *figures)
+    return table
+
+
+def _finite(value: Any) -> Any:
+    """JSON has no infinity and no NaN: null stands for them."""
+    if isinstance(value, dict):
+        return {key: _finite(entry) for key, entry in value.items()}
+    return None if isinstance(value, float) and not np.isfinite(value) else value
+
+
+def _mesh_or_shape(name: str) -> Mesh:
+    if name in shapes.names() and not Path(name).exists():
+        return shapes.make(name)
+    return load_mesh(name)
+
+
+def _writable_folder(folder: Path) -> Path:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise InputError(f"{folder}: the folder cannot be written ({error.strerror})") from error
+    return folder
+
+
+def _write_text(path: Path, text: str) -> None:
+    with tempfile.NamedTemporaryFile("w", dir=path.parent, prefix=f".{path.name}-", delete=False) as scratch:
+        scratch.write(text + "\n")
+    os.replace(scratch.name, path)
+
+
+def _scene_info(scene: Scene) -> None:
+    camera, console = scene.camera, _console()
+    console.print(f"camera: {camera.width} x {camera.height}, eye {list(camera.eye)}, fov_y {camera.fov_y}")
+    kinds = [light.kind for light in scene.lights]
+    console.print(f"lights: {', '.join(kinds) or 'none'}; shadows: {scene.lighting.shadows}")
+    console.print(f"method: {scene.reflection.method}, max_bounces: {scene.reflection.max_bounces}")
+    table = Table("object", "geometry", "triangles", "mirrors", "size in the world")
+    for entry in scene.objects:
+        mesh, matrix = entry.geometry, entry.world_from_object()
+        low, high = mesh.bounds
+        size = np.linalg.norm(matrix[:3, :3], axis=0) * (high - low)
+        source = entry.shape or (Path(entry.mesh).name if isinstance(entry.mesh, str) else "mesh")
+        row = (entry.name, source, str(len(mesh.faces)), "yes" if entry.is_reflector else "no")
+        table.add_row(*row, " x ".join(f"{side:.3g}" for side in size))
+    console.print(table)
+
+
+def _mesh_info(mesh: Mesh) -> None:
+    console = _console()
+    low, high = mesh.bounds
+    textures = sum(part.texture is not None for part in mesh.parts)
+    console.print(f"{len(mesh.faces)} triangles, {len(mesh.vertices)} vertices")
+    console.print(f"from {low.tolist()} to {high.tolist()}")
+    console.print(f"parts: {len(mesh.parts)}, textures: {textures}, UVs: {'no' if mesh.uvs is None else 'yes'}")
+    maps = peel_mesh(DeviceMesh.upload(mesh, launch.resolve_device(None)), 128)
+    crossings = ", ".join(f"{axis} {count}" for axis, count in maps.crossings().items())
+    console.print(f"surfaces over one texel at 128: {crossings}")
+    odd = sum(int((maps.counts(axis) % 2).sum()) for axis in range(3))
+    console.print("closed: every texel has an even number" if odd == 0 else f"open: {odd} texels have an odd number")

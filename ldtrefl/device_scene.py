@@ -1,0 +1,245 @@
+"""The scene as kernels see it: geometry, places and materials in device arrays.
+
+Three spaces. *World*: the scene file's. *Device*: the world moved and scaled alike along all axes so that the objects
+fill the unit box about 0; all rays and positions in kernels are in it, so float32 holds at any scale and offset. *Unit*:
+an object's own vertices with their bounding box's longest side from -1 to 1. The matrices between them are composed in
+float64. Objects with the same mesh share its arrays: a moved object moves its rays, never its maps.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from ldtrefl.mesh import Mesh
+from ldtrefl.scene import Camera, Light, Object, Scene
+
+
+@wp.struct
+class ObjectRecord:
+    """An object: its mesh, place and material."""
+
+    vertices: wp.array(dtype=wp.vec3)  # unit space
+    normals: wp.array(dtype=wp.vec3)  # unit space, not always of unit length, zero where undefined
+    uvs: wp.array(dtype=wp.vec2)  # empty without texture coordinates
+    faces: wp.array(dtype=wp.vec3i)
+    device_from_unit: wp.mat44
+    unit_from_device: wp.mat44
+    normal_from_unit: wp.mat33  # inverse transpose of device_from_unit's linear part
+    centre: wp.vec3  # bounding sphere, device space
+    radius: float
+    first_triangle: int  # number of triangle 0 among all objects' triangles
+    triangle_count: int
+    smooth: int
+    fresnel: int
+    albedo: wp.vec3
+    emission: wp.vec3
+    mirror: wp.vec3
+    part_first: wp.array(dtype=wp.int32)  # first triangle of each part
+    part_color: wp.array(dtype=wp.vec3)
+    part_texture: wp.array(dtype=wp.vec3i)  # first texel, width, height; width 0 without a texture
+    texels: wp.array(dtype=wp.vec3)  # all parts' textures, row 0 at v = 1
+
+
+@wp.struct
+class LightRecord:
+    """A light in device space."""
+
+    is_point: int
+    vector: wp.vec3  # directional: unit, towards the light; point: its position
+    radiance: wp.vec3  # point: intensity in device units
+
+
+@wp.struct
+class LightingRecord:
+    """Lights and environment."""
+
+    lights: wp.array(dtype=LightRecord)
+    ambient: wp.vec3
+    sky: wp.vec3
+    ground: wp.vec3
+    up: wp.vec3  # unit
+    image: wp.array2d(dtype=wp.vec3)  # equirectangular; empty without one
+    shadows: int
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class DeviceMesh:
+    """A mesh's arrays on a device."""
+
+    mesh: Mesh
+    vertices: wp.array
+    normals: wp.array
+    uvs: wp.array
+    faces: wp.array
+
+    @classmethod
+    def upload(cls, mesh: Mesh, device: wp.Device) -> DeviceMesh:
+        """Copy ``mesh`` to ``device``."""
+        uvs = np.zeros((0, 2), np.float32) if mesh.uvs is None else mesh.uvs
+        return cls(
+            mesh,
+            wp.array(mesh.unit_vertices, dtype=wp.vec3, device=device),
+            wp.array(mesh.normals, dtype=wp.vec3, device=device),
+            wp.array(uvs, dtype=wp.vec2, device=device),
+            wp.array(mesh.faces, dtype=wp.vec3i, device=device),
+        )
+
+
+@dataclasses.dataclass(eq=False)
+class DeviceObject:
+    """An object of the scene with its float64 matrices."""
+
+    index: int
+    source: Object
+    geometry: DeviceMesh
+    world_from_unit: np.ndarray
+    """(4, 4) float64."""
+    record: Any
+    """The ``ObjectRecord``."""
+
+    @property
+    def longest_side(self) -> float:
+        """Length in the world of the longest side of the object's own bounding box."""
+        return 2.0 * float(np.linalg.norm(self.world_from_unit[:3, :3], axis=0).max())
+
+
+class DeviceScene:
+    """A scene uploaded to a device."""
+
+    def __init__(self, scene: Scene, device: wp.Device) -> None:
+        self.scene = scene
+        self.device = device
+        self.device_from_world = _device_from_world(scene)
+        meshes: dict[int, DeviceMesh] = {}
+        self.objects: list[DeviceObject] = []
+        first_triangle = 0
+        for index, source in enumerate(scene.objects):
+            mesh = source.geometry
+            if id(mesh) not in meshes:
+                meshes[id(mesh)] = DeviceMesh.upload(mesh, device)
+            placed = self._placed(index, source, meshes[id(mesh)], first_triangle)
+            self.objects.append(placed)
+            first_triangle += len(mesh.faces)
+        self.triangle_count = first_triangle
+        self.records = wp.array([entry.record for entry in self.objects], dtype=ObjectRecord, device=device)
+        self.lighting = self._lighting()
+        self.look_from(scene.camera)
+
+    @property
+    def device_units_per_world_unit(self) -> float:
+        """Scale of device space."""
+        return float(self.device_from_world[0, 0])
+
+    @property
+    def reflectors(self) -> list[DeviceObject]:
+        """The objects that mirror."""
+        return [entry for entry in self.objects if entry.source.is_reflector]
+
+    def look_from(self, camera: Camera) -> None:
+        """Turn the environment to the camera's ``up``."""
+        up = np.asarray(camera.up, float)
+        self.lighting.up = wp.vec3(*(up / np.linalg.norm(up)))
+
+    def _placed(self, index: int, source: Object, geometry: DeviceMesh, first_triangle: int) -> DeviceObject:
+        centre, half = geometry.mesh.unit_frame
+        object_from_unit = np.diag([half, half, half, 1.0])
+        object_from_unit[:3, 3] = centre
+        world_from_unit = source.world_from_object() @ object_from_unit
+        device_from_unit = self.device_from_world @ world_from_unit
+        inverse = np.linalg.inv(device_from_unit)
+        record = ObjectRecord()
+        record.vertices, record.normals = geometry.vertices, geometry.normals
+        record.uvs, record.faces = geometry.uvs, geometry.faces
+        record.device_from_unit = wp.mat44(device_from_unit.astype(np.float32))
+        record.unit_from_device = wp.mat44(inverse.astype(np.float32))
+        normal_from_unit = inverse[:3, :3].T / np.abs(inverse[:3, :3]).max()
+        record.normal_from_unit = wp.mat33(normal_from_unit.astype(np.float32))
+        record.centre, record.radius = _bounding_sphere(geometry.mesh, device_from_unit)
+        record.first_triangle, record.triangle_count = first_triangle, len(geometry.mesh.faces)
+        material = source.material
+        record.smooth, record.fresnel = int(source.smooth), int(material.fresnel)
+        record.albedo, record.emission = wp.vec3(*material.albedo), wp.vec3(*material.emission)
+        record.mirror = wp.vec3(*material.mirror)
+        self._look(record, source, geometry.mesh)
+        return DeviceObject(index, source, geometry, world_from_unit, record)
+
+    def _look(self, record: Any, source: Object, mesh: Mesh) -> None:
+        textures = [part.texture for part in mesh.parts]
+        if source.texture is not None:
+            textures = [source.texture] * len(mesh.parts)
+        texels: list[np.ndarray] = []
+        places: dict[int, tuple[int, int, int]] = {}
+        count = 0
+        for texture in textures:
+            if texture is not None and id(texture) not in places:
+                places[id(texture)] = (count, texture.shape[1], texture.shape[0])
+                texels.append(texture.reshape(-1, 3))
+                count += len(texels[-1])
+        table = [(0, 0, 0) if texture is None else places[id(texture)] for texture in textures]
+        pool = np.concatenate(texels) if texels else np.zeros((0, 3), np.float32)
+        record.part_first = wp.array([p.first_triangle for p in mesh.parts], dtype=wp.int32, device=self.device)
+        record.part_color = wp.array([p.color for p in mesh.parts], dtype=wp.vec3, device=self.device)
+        record.part_texture = wp.array(table, dtype=wp.vec3i, device=self.device)
+        record.texels = wp.array(pool, dtype=wp.vec3, device=self.device)
+
+    def _lighting(self) -> Any:
+        scene = self.scene
+        record = LightingRecord()
+        lights = [self._light(light) for light in scene.lights]
+        record.lights = (
+            wp.array(lights, dtype=LightRecord, device=self.device)
+            if lights
+            else wp.empty(0, dtype=LightRecord, device=self.device)
+        )
+        record.ambient = wp.vec3(*scene.lighting.ambient)
+        record.sky, record.ground = wp.vec3(*scene.environment.sky), wp.vec3(*scene.environment.ground)
+        image = scene.environment_image
+        image = np.zeros((0, 0, 3), np.float32) if image is None else image
+        record.image = wp.array(image, dtype=wp.vec3, device=self.device)
+        record.shadows = int(scene.lighting.shadows)
+        return record
+
+    def _light(self, light: Light) -> Any:
+        record = LightRecord()
+        record.is_point = int(light.kind == "point")
+        if light.position is not None and light.intensity is not None:
+            record.vector = wp.vec3(*(self.device_from_world @ [*light.position, 1.0])[:3])
+            record.radiance = wp.vec3(*(np.asarray(light.intensity) * self.device_units_per_world_unit**2))
+        elif light.direction is not None and light.radiance is not None:
+            towards = -np.asarray(light.direction, float)
+            record.vector = wp.vec3(*(towards / np.linalg.norm(towards)))
+            record.radiance = wp.vec3(*light.radiance)
+        return record
+
+
+def _device_from_world(scene: Scene) -> np.ndarray:
+    corners = [_world_corners(entry) for entry in scene.objects]
+    if not corners:
+        return np.eye(4)
+    points = np.concatenate(corners)
+    low, high = points.min(axis=0), points.max(axis=0)
+    half = float((high - low).max()) / 2.0
+    scale = 1.0 / half if half > 0.0 else 1.0
+    matrix = np.diag([scale, scale, scale, 1.0])
+    matrix[:3, 3] = -(low + (high - low) / 2.0) * scale
+    return matrix
+
+
+def _world_corners(entry: Object) -> np.ndarray:
+    low, high = entry.geometry.bounds
+    picks = np.array(np.meshgrid([0, 1], [0, 1], [0, 1])).reshape(3, -1).T
+    corners = np.where(picks == 0, low, high)
+    return (np.hstack([corners, np.ones((8, 1))]) @ entry.world_from_object().T)[:, :3]
+
+
+def _bounding_sphere(mesh: Mesh, device_from_unit: np.ndarray) -> tuple[wp.vec3, float]:
+    """About the box's centre, padded for the rounding of float32 positions."""
+    centre = device_from_unit[:3, 3]
+    points = mesh.unit_vertices.astype(float) @ device_from_unit[:3, :3].T
+    used = points[np.unique(mesh.faces)]
+    radius = float(np.sqrt((used**2).sum(axis=1).max()))
+    return wp.vec3(*centre), radius * (1.0 + 1e-5) + 1e-6 * float(np.abs(centre).max())

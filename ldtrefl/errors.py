@@ -1,0 +1,69 @@
+"""What a user's wrong input raises, always as one line that names the place, the fault and what is allowed."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pydantic import ValidationError
+
+
+UNKNOWN_KEY = ("extra_forbidden", "unexpected_keyword_argument")
+"""Pydantic's names for a key that a table does not have."""
+
+
+class InputError(ValueError):
+    """The user's input is wrong. The message is one line; the command line prints it and exits with status 2."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(" ".join(str(message).split()))
+
+    def within(self, place: str) -> InputError:
+        """The same fault, with the file or key that holds it put in front."""
+        return InputError(f"{place}: {self}")
+
+
+def unknown_name(kind: str, name: str, allowed: Iterable[str]) -> InputError:
+    """An ``InputError`` for a name that is not one of ``allowed``, suggesting the nearest."""
+    names = sorted(allowed)
+    near = difflib.get_close_matches(name, names, n=1)
+    hint = f"; did you mean '{near[0]}'?" if near else ""
+    return InputError(f"unknown {kind} '{name}'{hint} (allowed: {', '.join(names)})")
+
+
+def first_fault(error: ValidationError, allowed_keys: dict[str, list[str]]) -> InputError:
+    """The first fault that pydantic found, as one line with its full key.
+
+    ``allowed_keys`` maps a table's key without indices ('object.material', '' at the top) to the keys it may hold.
+    """
+    faults = error.errors(include_url=False, include_context=True)
+    # A misspelt key often shows as a missing one too: the unknown key is the one to name.
+    fault = next((fault for fault in faults if fault["type"] in UNKNOWN_KEY), faults[0])
+    location = [part for part in fault["loc"] if not str(part).startswith("function-")]
+    more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
+    if fault["type"] in UNKNOWN_KEY:
+        table = ".".join(str(part) for part in location[:-1] if isinstance(part, str))
+        where = _key(location[:-1])
+        unknown = unknown_name("key", str(location[-1]), allowed_keys.get(table, []))
+        return unknown.within(where) if where else unknown
+    given = ""
+    if fault["type"] not in ("missing", "missing_argument", "value_error"):
+        given = f", got {_shortened(fault['input'])}"
+    message = fault["msg"].removeprefix("Value error, ").removeprefix("Input ")
+    text = f"{message}{given}{more}"
+    key = _key(location)
+    return InputError(f"{key}: {text}" if key else text)
+
+
+def _key(location: Iterable[int | str]) -> str:
+    key = ""
+    for part in location:
+        key += f"[{part}]" if isinstance(part, int) else f".{part}" if key else part
+    return key
+
+
+def _shortened(value: object, limit: int = 60) -> str:
+    text = repr(value)
+    return text if len(text) <= limit else text[: limit - 3] + "..."

@@ -1,0 +1,221 @@
+"""Triangle meshes: checked, read from files, brought to the unit cube.
+
+Vertices are ``(n, 3)`` float64 in the object's own coordinates, faces ``(m, 3)`` int32 in the order of the file: a
+triangle's number means the same to the mesh, the ray caster and the layered depth texture.
+"""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import trimesh
+
+from ldtrefl.errors import InputError
+from ldtrefl.image import linear_from_srgb
+
+MAX_TRIANGLES = 1 << 30
+"""Triangle numbers are int32 and a fragment keeps one bit of it for the facing."""
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A run of triangles with one look: a material of the mesh's file."""
+
+    first_triangle: int = 0
+    color: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    """Linear base colour, times the scene's albedo."""
+    texture: np.ndarray | None = None
+    """``(h, w, 3)`` float32 linear, row 0 at v = 1; None without one."""
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """A checked triangle mesh.
+
+    Raises:
+        InputError: no triangles, an index out of range, a vertex that is not finite, or shapes that do not fit.
+    """
+
+    vertices: np.ndarray
+    """(n, 3) float64."""
+    faces: np.ndarray
+    """(m, 3) int32."""
+    normals: np.ndarray | None = None
+    """(n, 3) float32 shading normals; made from the faces when not given."""
+    uvs: np.ndarray | None = None
+    """(n, 2) float32 texture coordinates, v = 0 at the bottom row."""
+    parts: tuple[Part, ...] = field(default=(Part(),))
+
+    def __post_init__(self) -> None:
+        vertices = _array(self.vertices, np.float64, 3, "vertices")
+        faces = _indices(self.faces)
+        if len(faces) == 0:
+            raise InputError("the mesh has no triangles")
+        if len(faces) > MAX_TRIANGLES:
+            raise InputError(f"the mesh has {len(faces)} triangles, at most {MAX_TRIANGLES} allowed")
+        wrong = np.flatnonzero(((faces < 0) | (faces >= len(vertices))).any(axis=1))
+        if len(wrong):
+            first = int(wrong[0])
+            raise InputError(
+                f"triangle {first} has vertices {faces[first].tolist()}, allowed are 0 to {len(vertices) - 1}"
+            )
+        wrong = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
+        if len(wrong):
+            first = int(wrong[0])
+            raise InputError(f"vertex {first} is not finite: {vertices[first].tolist()}")
+        faces = faces.astype(np.int32)
+        normals = self.normals
+        normals = smooth_normals(vertices, faces) if normals is None else _array(normals, np.float32, 3, "normals")
+        uvs = None if self.uvs is None else _array(self.uvs, np.float32, 2, "uvs")
+        for name, values in (("normals", normals), ("uvs", uvs)):
+            if values is not None and len(values) != len(vertices):
+                raise InputError(f"{len(values)} {name} for {len(vertices)} vertices")
+        for name, value in (("vertices", vertices), ("faces", faces), ("normals", normals), ("uvs", uvs)):
+            object.__setattr__(self, name, value)
+
+    @functools.cached_property
+    def bounds(self) -> np.ndarray:
+        """(2, 3) float64: the lowest and highest corner of the triangles' box (unused vertices left out)."""
+        used = self.vertices[np.unique(self.faces)]
+        return np.stack([used.min(axis=0), used.max(axis=0)])
+
+    @functools.cached_property
+    def unit_frame(self) -> tuple[np.ndarray, float]:
+        """``(centre, half)``: ``(v - centre) / half`` fills -1..1 along the box's longest side."""
+        low, high = self.bounds
+        half = float((high - low).max()) / 2.0
+        return low + (high - low) / 2.0, half if half > 0.0 else 1.0
+
+    @functools.cached_property
+    def unit_vertices(self) -> np.ndarray:
+        """(n, 3) float32 in the unit frame. The shift is done in float64, so a far-off mesh loses nothing."""
+        centre, half = self.unit_frame
+        return np.clip((self.vertices - centre) / half, -1e30, 1e30).astype(np.float32)
+
+
+def _array(values: Any, dtype: type, width: int, name: str) -> np.ndarray:
+    try:
+        array = np.ascontiguousarray(values, dtype)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{name} must be numbers of shape (n, {width}), got {type(values).__name__}") from error
+    if array.ndim != 2 or array.shape[1] != width:
+        raise InputError(f"{name} must have shape (n, {width}), got {array.shape}")
+    return array
+
+
+def _indices(values: Any) -> np.ndarray:
+    try:
+        array = np.asarray(values)
+        if array.size == 0:
+            return np.zeros((0, 3), np.int64)
+        if array.dtype.kind not in "iu":
+            whole = array.astype(np.int64)
+            if not np.array_equal(whole, array):
+                raise ValueError
+            array = whole
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError("faces must be whole numbers of shape (m, 3)") from error
+    return _array(array, np.int64, 3, "faces")
+
+
+def smooth_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """(n, 3) float32 vertex normals weighted by angle, the same at vertices of one position. Zero where undefined."""
+    _, first, inverse = np.unique(vertices, axis=0, return_index=True, return_inverse=True)
+    inverse = inverse.reshape(-1)
+    centre, size = vertices.mean(axis=0), float(np.ptp(vertices, axis=0).max()) or 1.0
+    welded = trimesh.Trimesh((vertices[first] - centre) / size, inverse[faces], process=False, validate=False)
+    return np.nan_to_num(welded.vertex_normals[inverse]).astype(np.float32)
+
+
+def load_mesh(path: str | Path) -> Mesh:
+    """Read any file that trimesh reads; materials' base colours and textures come along.
+
+    The same file is read once, and again only when it has changed.
+
+    Raises:
+        InputError: the file is missing, unreadable or holds no sound mesh; the message names it.
+    """
+    path = Path(path)
+    try:
+        stat = path.stat()
+    except OSError as error:
+        raise InputError(f"{path}: no such mesh ({error.strerror})") from error
+    return _load_mesh(str(path.resolve()), stat.st_mtime_ns, stat.st_size)
+
+
+@functools.lru_cache(maxsize=32)
+def _load_mesh(path: str, _modified: int, _size: int) -> Mesh:
+    if Path(path).suffix.lower().lstrip(".") not in trimesh.available_formats():
+        kinds = ", ".join(sorted(trimesh.available_formats()))
+        raise InputError(f"{path}: not a kind of mesh file that can be read (allowed: {kinds})")
+    try:
+        loaded = trimesh.load_scene(path, process=False, maintain_order=True)
+        pieces = [piece for piece in loaded.dump() if isinstance(piece, trimesh.Trimesh) and len(piece.faces)]
+    except InputError:
+        raise
+    except Exception as error:  # whatever a damaged file provokes in a reader is the file's fault
+        raise InputError(f"{path}: not a mesh that can be read ({type(error).__name__}: {error})") from error
+    if not pieces:
+        raise InputError(f"{path}: the mesh has no triangles")
+    try:
+        return _joined(pieces)
+    except InputError as error:
+        raise error.within(path) from None
+
+
+def _joined(pieces: list[trimesh.Trimesh]) -> Mesh:
+    with_uvs = any(_uvs(piece) is not None for piece in pieces)
+    vertices, faces, normals, uvs, parts = [], [], [], [], []
+    vertex_count = triangle_count = 0
+    for piece in pieces:
+        checked = Mesh(piece.vertices, piece.faces, _stored_normals(piece))
+        uv = _uvs(piece)
+        vertices.append(checked.vertices)
+        faces.append(checked.faces + vertex_count)
+        normals.append(checked.normals)
+        uvs.append(np.zeros((len(checked.vertices), 2), np.float32) if uv is None else uv)
+        color, texture = _look(piece)
+        parts.append(Part(triangle_count, color, texture if uv is not None else None))
+        vertex_count += len(checked.vertices)
+        triangle_count += len(checked.faces)
+    return Mesh(
+        np.concatenate(vertices),
+        np.concatenate(faces),
+        np.concatenate(normals),
+        np.concatenate(uvs) if with_uvs else None,
+        tuple(parts),
+    )
+
+
+def _stored_normals(piece: trimesh.Trimesh) -> np.ndarray | None:
+    """The normals that the file holds, if it holds any."""
+    stored = piece._cache.cache.get("vertex_normals")
+    return None if stored is None or np.shape(stored) != np.shape(piece.vertices) else np.asarray(stored)
+
+
+def _uvs(piece: trimesh.Trimesh) -> np.ndarray | None:
+    uv = getattr(piece.visual, "uv", None)
+    if uv is None or np.shape(uv) != (len(piece.vertices), 2) or not np.isfinite(uv).all():
+        return None
+    return np.asarray(uv, np.float32)
+
+
+def _look(piece: trimesh.Trimesh) -> tuple[tuple[float, float, float], np.ndarray | None]:
+    """A piece's base colour and texture, both linear (glTF: factors are linear, textures sRGB)."""
+    material = getattr(piece.visual, "material", None)
+    if material is None:
+        return (1.0, 1.0, 1.0), None
+    factor = getattr(material, "baseColorFactor", None)
+    color = (1.0, 1.0, 1.0)
+    if factor is not None:
+        scale = 255.0 if np.asarray(factor).dtype.kind in "iu" else 1.0
+        r, g, b = (float(channel) / scale for channel in np.asarray(factor)[:3])
+        color = (r, g, b)
+    picture = getattr(material, "baseColorTexture", None) or getattr(material, "image", None)
+    if picture is None:
+        return color, None
+    return color, linear_from_srgb(np.asarray(picture.convert("RGB"), np.float32) / 255.0)

@@ -1,0 +1,85 @@
+"""The contract of a reflection method: from a G-buffer to an image of reflected radiance.
+
+A method is a class with a ``name`` and a ``Config``. It is made once per renderer, so it may keep maps and trees
+between frames, and asked once per frame.
+"""
+
+from __future__ import annotations
+
+import abc
+import dataclasses
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import warp as wp
+from pydantic import ConfigDict, TypeAdapter, ValidationError
+
+from ldtrefl.device_scene import DeviceScene
+from ldtrefl.errors import InputError, first_fault, unknown_name
+from ldtrefl.gbuffer import GBuffer
+from ldtrefl.launch import Stats
+from ldtrefl.reflect import BoundTracer, FirstHits
+
+CONFIG = ConfigDict(extra="forbid", use_attribute_docstrings=True)
+"""How every method's ``Config`` is checked."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reflection:
+    """A method's answer."""
+
+    radiance: wp.array
+    """(h * w,) vec3: reflected radiance per pixel, before the reflector's own reflectance; 0 off the reflectors."""
+    hits: FirstHits | None = None
+    """Where the first rays ended, for methods that have rays."""
+
+
+class Method(abc.ABC):
+    """A way to compute reflections."""
+
+    name: ClassVar[str]
+    Config: ClassVar[type]
+    """A frozen pydantic dataclass, a docstring under each field."""
+
+    def __init__(self, scene: DeviceScene, config: Any) -> None:
+        self.scene = scene
+        self.config = config
+
+    @abc.abstractmethod
+    def reflect(self, gbuffer: GBuffer, stats: Stats) -> Reflection:
+        """The reflections in what the camera sees. Called only if it sees a reflector."""
+
+    @abc.abstractmethod
+    def shadow_tracer(self, stats: Stats) -> BoundTracer:
+        """What answers shadow rays from what the camera sees. Called only if the scene has shadows."""
+
+    @classmethod
+    def describe(cls) -> str:
+        """The first line of the method's docstring."""
+        return (cls.__doc__ or "").strip().splitlines()[0]
+
+    @classmethod
+    def options(cls) -> dict[str, tuple[Any, str]]:
+        """Option -> (default, what it does)."""
+        fields = cls.Config.__pydantic_fields__  # type: ignore[attr-defined]
+        return {
+            entry.name: (entry.default, " ".join((fields[entry.name].description or "").split()))
+            for entry in dataclasses.fields(cls.Config)
+        }
+
+    @classmethod
+    def configured(cls, options: dict[str, Any]) -> Any:
+        """A checked ``Config``.
+
+        Raises:
+            InputError: an option that the method does not have, or a value that is not allowed.
+        """
+        for name in options:
+            if name not in cls.options():
+                raise unknown_name(f"option of method {cls.name}", name, cls.options())
+        try:
+            return TypeAdapter(cls.Config).validate_python(options)
+        except ValidationError as error:
+            raise first_fault(error, {}).within(f"method {cls.name}") from None
+        except InputError as error:
+            raise error.within(f"method {cls.name}") from None

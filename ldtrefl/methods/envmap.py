@@ -1,0 +1,145 @@
+"""Environment mapping: J. F. Blinn, M. E. Newell, "Texture and Reflection in Computer Generated Images" (1976);
+as a cube map, N. Greene (1986). The baseline that every paper compares with.
+
+One cube map per reflector, drawn from its centre without it, looked up by the reflected direction alone.
+
+    ldtrefl render scene.toml --method envmap --set resolution=512
+
+Fails: everything is taken to be infinitely far away, so near objects are reflected in the wrong place and size, and
+contact shows a gap.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+import warp as wp
+from pydantic import Field
+from pydantic.dataclasses import dataclass
+
+from ldtrefl import launch
+from ldtrefl.device_scene import DeviceObject, ObjectRecord
+from ldtrefl.gbuffer import GBuffer, GBufferView, draw_gbuffer, pixel_view
+from ldtrefl.launch import Stats
+from ldtrefl.methods.base import CONFIG, Method, Reflection
+from ldtrefl.raycast import BVH, BvhView, Raycaster
+from ldtrefl.reflect import BoundTracer, no_shadows, shade_gbuffer
+from ldtrefl.scene import Camera
+from ldtrefl.shade import mirror_direction, surface_at
+
+
+@wp.func
+def cube_face(direction: wp.vec3) -> int:
+    """The face 0..5 = +x, -x, +y, -y, +z, -z that a direction points to."""
+    axis = int(0)
+    if wp.abs(direction[1]) > wp.abs(direction[axis]):
+        axis = 1
+    if wp.abs(direction[2]) > wp.abs(direction[axis]):
+        axis = 2
+    if direction[axis] < 0.0:
+        return 2 * axis + 1
+    return 2 * axis
+
+
+@wp.func
+def look_up(cube: wp.array(dtype=wp.vec3), resolution: int, direction: wp.vec3) -> wp.vec3:
+    """Bilinear radiance of a cube map; samples beyond a face's edge are its border's."""
+    face = cube_face(direction)
+    # The face's camera: forward along its axis, up +z, or +y for the faces of z.
+    forward = wp.vec3(0.0)
+    forward[face / 2] = wp.where(face % 2 == 0, 1.0, -1.0)
+    up = wp.where(face >= 4, wp.vec3(0.0, 1.0, 0.0), wp.vec3(0.0, 0.0, 1.0))
+    right = wp.cross(forward, up)
+    depth = wp.dot(direction, forward)
+    x = 0.5 * float(resolution) * (wp.dot(direction, right) / depth + 1.0) - 0.5
+    y = 0.5 * float(resolution) * (1.0 - wp.dot(direction, up) / depth) - 0.5
+    last = resolution - 1
+    x0, y0 = wp.clamp(int(wp.floor(x)), 0, last), wp.clamp(int(wp.floor(y)), 0, last)
+    x1, y1 = wp.clamp(int(wp.floor(x)) + 1, 0, last), wp.clamp(int(wp.floor(y)) + 1, 0, last)
+    fx, fy = x - wp.floor(x), y - wp.floor(y)
+    first = face * resolution * resolution
+    upper = (1.0 - fx) * cube[first + y0 * resolution + x0] + fx * cube[first + y0 * resolution + x1]
+    lower = (1.0 - fx) * cube[first + y1 * resolution + x0] + fx * cube[first + y1 * resolution + x1]
+    return (1.0 - fy) * upper + fy * lower
+
+
+@launch.kernel
+def reflect_cube(
+    first: int,
+    # In:
+    gbuffer: GBufferView,
+    objects: wp.array(dtype=ObjectRecord),
+    reflector: int,
+    cube: wp.array(dtype=wp.vec3),
+    resolution: int,
+    # Out:
+    radiance_out: wp.array(dtype=wp.vec3),
+):
+    i = first + wp.tid()
+    if gbuffer.object[i] == reflector:
+        uv = gbuffer.barycentrics[i]
+        view = pixel_view(gbuffer, objects, i)
+        surface = surface_at(objects, reflector, gbuffer.triangle[i], uv[0], uv[1], view)
+        radiance_out[i] = look_up(cube, resolution, mirror_direction(view, surface.normal))
+
+
+class EnvironmentMap(Method):
+    """A cube map from each reflector's centre, looked up by direction: the classic baseline."""
+
+    name = "envmap"
+
+    @dataclass(frozen=True, kw_only=True, config=CONFIG)
+    class Config:
+        """Options of ``envmap``."""
+
+        resolution: Annotated[int, Field(strict=True, ge=1, le=4096)] = 512
+        """Pixels along a side of each face, 1 to 4096."""
+
+    def shadow_tracer(self, stats: Stats) -> BoundTracer:
+        """A cube map has no shadow rays of its own: a BVH answers them."""
+        if not hasattr(self, "_shadows"):
+            with stats.stage("build", self.scene.device):
+                self._trees = [Raycaster.of(entry.geometry) for entry in self.scene.objects]
+                views = [tree.view() for tree in self._trees]
+                self._shadows = BoundTracer(BVH, wp.array(views, dtype=BvhView, device=self.scene.device))
+        return self._shadows
+
+    def reflect(self, gbuffer: GBuffer, stats: Stats) -> Reflection:
+        """Draw the cube maps on first need, then look up every reflector pixel."""
+        device, n = self.scene.device, gbuffer.pixel_count
+        cubes: dict[int, wp.array] = self.__dict__.setdefault("_cubes", {})
+        radiance = wp.zeros(n, dtype=wp.vec3, device=device)
+        stats.count("rays", int(gbuffer.reflector_mask.sum()))
+        for entry in self.scene.reflectors:
+            if not (gbuffer.objects == entry.index).any():
+                continue
+            if entry.index not in cubes:
+                cubes[entry.index] = self._draw_cube(entry, stats)
+            with stats.stage("shade", device):
+                inputs = [gbuffer.view, self.scene.records, entry.index, cubes[entry.index]]
+                launch.launch(reflect_cube, n, [*inputs, self.config.resolution, radiance], device)
+        return Reflection(radiance)
+
+    def _draw_cube(self, reflector: DeviceObject, stats: Stats) -> wp.array:
+        """(6 * resolution^2,) vec3 radiance about the reflector's centre, face by face, row by row."""
+        shadows = self.scene.scene.lighting.shadows
+        shadow = self.shadow_tracer(stats) if shadows else no_shadows(self.scene.device)
+        eye = reflector.world_from_unit[:3, 3]
+        size = max(reflector.longest_side, 1e-6 * float(np.abs(eye).max()))
+        faces = []
+        with stats.stage("cubemap", self.scene.device):
+            for face in range(6):
+                forward = np.zeros(3)
+                forward[face // 2] = size if face % 2 == 0 else -size
+                camera = Camera(
+                    eye=tuple(eye.tolist()),
+                    look_at=tuple((eye + forward).tolist()),
+                    up=(0.0, 1.0, 0.0) if face >= 4 else (0.0, 0.0, 1.0),
+                    fov_y=90.0,
+                    width=self.config.resolution,
+                    height=self.config.resolution,
+                )
+                seen = draw_gbuffer(self.scene, camera, without=reflector.index)
+                faces.append(shade_gbuffer(seen, shadow)[0].numpy())
+        return wp.array(np.concatenate(faces), dtype=wp.vec3, device=self.scene.device)

@@ -1,0 +1,99 @@
+"""How far an image is from the truth: masked image metrics, and errors of the hits behind them.
+
+Image metrics take linear radiance ``(h, w, 3)`` and a mask ``(h, w)``, and average over the mask. SSIM, PSNR and FLIP
+are taken of what is shown: sRGB, clipped to 0..1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import flip_evaluator
+import numpy as np
+from skimage.metrics import structural_similarity
+
+from ldtrefl.image import srgb_from_linear
+from ldtrefl.reflect import FirstHits
+
+SSIM_WINDOW = 11
+"""Pixels along a side of SSIM's Gaussian window (sigma 1.5; Wang et al. 2004)."""
+
+RELMSE_FLOOR = 1e-2
+"""Added to the squared reference in relMSE, so that black pixels do not divide by zero."""
+
+
+def ssim(image: np.ndarray, reference: np.ndarray, mask: np.ndarray) -> float:
+    """Structural similarity (Wang et al. 2004), averaged over the mask; 1 is equal. NaN for an empty mask."""
+    if not mask.any():
+        return float("nan")
+    short = [max(0, SSIM_WINDOW - side) for side in mask.shape]
+    padding = ((0, short[0]), (0, short[1]), (0, 0))
+    shown, truth = (np.pad(srgb_from_linear(x), padding, mode="edge") for x in (image, reference))
+    _, values = structural_similarity(
+        truth,
+        shown,
+        channel_axis=2,
+        data_range=1.0,
+        gaussian_weights=True,
+        sigma=1.5,
+        use_sample_covariance=False,
+        full=True,
+    )
+    return float(values[: mask.shape[0], : mask.shape[1]].mean(axis=2)[mask].mean())
+
+
+def psnr(image: np.ndarray, reference: np.ndarray, mask: np.ndarray) -> float:
+    """Peak signal-to-noise ratio in dB; infinite if equal, NaN for an empty mask."""
+    if not mask.any():
+        return float("nan")
+    error = float(((srgb_from_linear(image) - srgb_from_linear(reference))[mask].astype(float) ** 2).mean())
+    return float("inf") if error == 0.0 else -10.0 * float(np.log10(error))
+
+
+def flip(image: np.ndarray, reference: np.ndarray, mask: np.ndarray) -> float:
+    """LDR-FLIP (Andersson et al. 2020) at 67 pixels per degree, averaged over the mask; 0 is equal."""
+    if not mask.any():
+        return float("nan")
+    shown, truth = srgb_from_linear(image), srgb_from_linear(reference)
+    errors, _, _ = flip_evaluator.evaluate(truth, shown, "LDR", applyMagma=False, computeMeanError=False)
+    return float(np.asarray(errors).reshape(mask.shape)[mask].mean())
+
+
+def relmse(image: np.ndarray, reference: np.ndarray, mask: np.ndarray) -> float:
+    """Relative mean squared error of linear radiance (Rousselle et al. 2011)."""
+    if not mask.any():
+        return float("nan")
+    a, b = image[mask].astype(float), reference[mask].astype(float)
+    return float(((a - b) ** 2 / (b**2 + RELMSE_FLOOR)).mean())
+
+
+@dataclass(frozen=True)
+class HitErrors:
+    """How a method's first hits differ from the truth's."""
+
+    wrong_hits: float
+    """Rays that hit something where the truth hits nothing, in percent of true hits."""
+    wrong_misses: float
+    """Rays that hit nothing where the truth hits, in percent of true hits."""
+    median: float
+    """Median distance error along the ray where both hit, in texels."""
+    p99: float
+    """99th percentile of the same."""
+
+
+def hit_errors(hits: FirstHits, truth: FirstHits, texel_sizes: np.ndarray, mask: np.ndarray) -> HitErrors:
+    """Compare first hits; ``texel_sizes`` (objects,) is the length of a texel of each object, in world units."""
+    hit, true_hit = (hits.object >= 0) & mask, (truth.object >= 0) & mask
+    true_hits = int(true_hit.sum())
+    if true_hits == 0:
+        wrong = 0.0 if not hit.any() else float("inf")
+        return HitErrors(wrong, 0.0, float("nan"), float("nan"))
+    both = hit & true_hit
+    errors = np.abs(hits.distance[both].astype(float) - truth.distance[both]) / texel_sizes[truth.object[both]]
+    median, p99 = np.percentile(errors, [50, 99]) if errors.size else (np.nan, np.nan)
+    return HitErrors(
+        100.0 * float((hit & ~true_hit).sum()) / true_hits,
+        100.0 * float((true_hit & ~hit).sum()) / true_hits,
+        float(median),
+        float(p99),
+    )

@@ -1,0 +1,167 @@
+"""What a tracer is, and tracing a batch of rays with one.
+
+A *tracer* answers single rays against single objects inside kernels: ``closest_hit`` and ``occluded``, two Warp
+functions over an array of *views*, one view per object. Kernels that trace are built from a tracer, so everything
+above it (bounces, shadows, shading, counters) exists once for the layered depth texture and for the BVH.
+
+A tracer works in the object's unit space, with unit directions. A miss is ``t = +inf`` and triangle -1.
+"""
+
+import functools
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from ldtrefl import launch
+from ldtrefl.device_scene import DeviceMesh
+from ldtrefl.errors import InputError
+
+
+@wp.struct
+class Hit:
+    """Where a ray meets an object first."""
+
+    t: float
+    triangle: int
+    u: float  # barycentrics: weights of the triangle's second and third corner
+    v: float
+    steps: int  # texels or samples looked at
+
+
+@wp.func
+def no_hit() -> Hit:
+    """A miss."""
+    hit = Hit()
+    hit.t = float(wp.inf)
+    hit.triangle = -1
+    return hit
+
+
+@dataclass(frozen=True)
+class Tracer:
+    """A pair of Warp functions and the type of the views that they read.
+
+    ``closest_hit(views, index, origin, direction, t_max) -> Hit`` and ``occluded(views, index, origin, direction,
+    t_max) -> bool``: object ``index``, its unit space, unit direction, hits at ``0 <= t < t_max``.
+    """
+
+    name: str
+    view: Any
+    closest_hit: Any
+    occluded: Any
+    clearance: float
+    """How far from a surface, in unit space, a ray must start so as not to meet that surface again."""
+
+
+@dataclass(frozen=True)
+class Hits:
+    """Answers to a batch of n rays, as numpy arrays if the rays were, else as Warp arrays."""
+
+    t: Any
+    """(n,) float32, in lengths of each ray's direction; +inf on a miss."""
+    normal: Any
+    """(n, 3) float32 unit facet normal by the triangle's winding; 0 on a miss."""
+    triangle: Any
+    """(n,) int32; -1 on a miss."""
+    barycentrics: Any
+    """(n, 2) float32 weights of the triangle's second and third corner."""
+    invalid: int
+    """Rays that were not finite or had no direction; they count as misses."""
+
+
+@functools.cache
+def batch_kernel(tracer: Tracer) -> wp.Kernel:
+    """The kernel that traces rays given in object space."""
+    closest_hit = tracer.closest_hit
+
+    @launch.kernel
+    def trace_batch(
+        first: int,
+        # In:
+        views: wp.array(dtype=tracer.view),
+        vertices: wp.array(dtype=wp.vec3),
+        faces: wp.array(dtype=wp.vec3i),
+        centre: wp.vec3d,
+        half: wp.float64,
+        origins: wp.array(dtype=wp.vec3),
+        directions: wp.array(dtype=wp.vec3),
+        # Out:
+        t_out: wp.array(dtype=float),
+        normal_out: wp.array(dtype=wp.vec3),
+        triangle_out: wp.array(dtype=int),
+        barycentrics_out: wp.array(dtype=wp.vec2),
+        invalid_out: wp.array(dtype=wp.uint8),
+    ):
+        i = first + wp.tid()
+        origin = wp.vec3d(wp.float64(origins[i][0]), wp.float64(origins[i][1]), wp.float64(origins[i][2]))
+        direction = wp.vec3d(wp.float64(directions[i][0]), wp.float64(directions[i][1]), wp.float64(directions[i][2]))
+        length = wp.length(direction)
+        hit = no_hit()
+        normal = wp.vec3(0.0)
+        if wp.isfinite(origin) and wp.isfinite(length) and length > wp.float64(0.0):
+            # Shift and scale in float64: the object may be tiny and far from its origin.
+            origin = (origin - centre) / half
+            direction = direction / length
+            hit = closest_hit(
+                views,
+                0,
+                wp.vec3(float(origin[0]), float(origin[1]), float(origin[2])),
+                wp.vec3(float(direction[0]), float(direction[1]), float(direction[2])),
+                float(wp.inf),
+            )
+            if hit.triangle >= 0:
+                hit.t = float(wp.float64(hit.t) * half / length)
+                corners = faces[hit.triangle]
+                a, b, c = vertices[corners[0]], vertices[corners[1]], vertices[corners[2]]
+                normal = wp.normalize(wp.cross(b - a, c - a))
+        else:
+            invalid_out[i] = wp.uint8(1)
+        t_out[i] = hit.t
+        normal_out[i] = normal
+        triangle_out[i] = hit.triangle
+        barycentrics_out[i] = wp.vec2(hit.u, hit.v)
+
+    return trace_batch
+
+
+def trace_batch(tracer: Tracer, views: wp.array, geometry: DeviceMesh, origins: Any, directions: Any) -> Hits:
+    """Trace n rays, given in the object's own coordinates, against one object.
+
+    Args:
+        origins: (n, 3) float32, a numpy or Warp array.
+        directions: (n, 3) float32, any length.
+
+    Raises:
+        InputError: the arrays' shapes are not (n, 3) and equal.
+    """
+    as_warp = isinstance(origins, wp.array)
+    device = geometry.vertices.device
+    starts, ways = (_ray_array(rays, name, device) for rays, name in ((origins, "origins"), (directions, "directions")))
+    if starts.shape != ways.shape:
+        raise InputError(f"{starts.shape[0]} origins for {ways.shape[0]} directions")
+    n = starts.shape[0]
+    centre, half = geometry.mesh.unit_frame
+    t, triangle = wp.empty(n, dtype=float, device=device), wp.empty(n, dtype=int, device=device)
+    normal, barycentrics = wp.empty(n, dtype=wp.vec3, device=device), wp.empty(n, dtype=wp.vec2, device=device)
+    invalid = wp.zeros(n, dtype=wp.uint8, device=device)
+    inputs = [views, geometry.vertices, geometry.faces, wp.vec3d(*centre), wp.float64(half), starts, ways]
+    launch.launch(batch_kernel(tracer), n, [*inputs, t, normal, triangle, barycentrics, invalid], device)
+    arrays = (t, normal, triangle, barycentrics)
+    return Hits(*(arrays if as_warp else (a.numpy() for a in arrays)), invalid=int(invalid.numpy().sum()))
+
+
+def _ray_array(rays: Any, name: str, device: wp.Device) -> wp.array:
+    if isinstance(rays, wp.array):
+        if rays.dtype is wp.vec3 and rays.ndim == 1:
+            return rays.to(device)
+        rays = rays.numpy()
+    try:
+        with np.errstate(over="ignore"):  # too large for float32 is infinite: a ray that counts as invalid
+            array = np.ascontiguousarray(rays, np.float32)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{name} must be numbers of shape (n, 3)") from error
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise InputError(f"{name} must have shape (n, 3), got {array.shape}")
+    return wp.array(array, dtype=wp.vec3, device=device)
