@@ -1,0 +1,87 @@
+"""Imports go one way: a module imports only what stands before it here, and no method imports another."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+import ldtrefl
+from ldtrefl.methods import all_methods
+
+PACKAGE = Path(ldtrefl.__file__).parent
+BOTTOM_TO_TOP = (
+    "errors",
+    "launch",
+    "image",
+    "mesh",
+    "teapot_patches",
+    "shapes",
+    "scene",
+    "camera",
+    "device_scene",
+    "shade",
+    "cubemap",
+    "raster",
+    "fragments",
+    "trace",
+    "march",
+    "ldt",
+    "peel",
+    "layers",
+    "raycast",
+    "gbuffer",
+    "cull",
+    "reflect",
+    "methods.base",
+    "methods",
+    "metrics",
+    "render",
+    "cli",
+    "__main__",
+)
+
+
+def imported_modules(path: Path) -> set[str]:
+    """Names of the package's modules that a file imports, wherever in the file."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom) and node.module:
+            if node.module == "ldtrefl":
+                found |= {alias.name for alias in node.names}
+            elif node.module.startswith("ldtrefl."):
+                found.add(node.module.removeprefix("ldtrefl."))
+        elif isinstance(node, ast.Import):
+            found |= {a.name.removeprefix("ldtrefl.") for a in node.names if a.name.startswith("ldtrefl.")}
+    return found
+
+
+MODULES = sorted(
+    str(path.relative_to(PACKAGE).with_suffix("")).replace("/", ".").removesuffix(".__init__")
+    for path in PACKAGE.rglob("*.py")
+    if path != PACKAGE / "__init__.py"
+)
+
+
+def path_of(module: str) -> Path:
+    path = PACKAGE / module.replace(".", "/")
+    return path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_imports_go_down(module: str) -> None:
+    is_method = module.startswith("methods.") and module != "methods.base"
+    place = "methods.base" if is_method else module
+    assert place in BOTTOM_TO_TOP, f"{module} has no place in the order"
+    below = set(BOTTOM_TO_TOP[: BOTTOM_TO_TOP.index(place) + is_method])
+    upwards = imported_modules(path_of(module)) - below
+    assert not upwards, f"{module} imports {upwards}, which stand above it"
+
+
+def test_only_launch_launches() -> None:
+    offenders = [m for m in MODULES if m != "launch" and "wp.launch(" in path_of(m).read_text()]
+    assert not offenders
+
+
+def test_methods_are_found_by_scanning() -> None:
+    files = {m.removeprefix("methods.") for m in MODULES if m.startswith("methods.")} - {"base"}
+    assert set(all_methods()) == files

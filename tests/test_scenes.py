@@ -1,0 +1,93 @@
+"""Every shipped scene by every method, held to the thresholds in its file."""
+
+import dataclasses
+import functools
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import ldtrefl
+from ldtrefl import metrics
+
+from .conftest import SCENES
+
+SHIPPED = sorted(SCENES.glob("*.toml"))
+ALL = SHIPPED + sorted((SCENES / "paper").glob("*.toml"))
+
+
+def name_of(path: Path) -> str:
+    return str(path.relative_to(SCENES).with_suffix(""))
+
+
+def loaded(path: Path) -> ldtrefl.Scene:
+    try:
+        return ldtrefl.load_scene(path)
+    except ldtrefl.InputError as error:
+        if "LDTREFL_MESH_PATH" in str(error):
+            pytest.skip(str(error))
+        raise
+
+
+@functools.cache
+def frame(path: Path, method: str) -> ldtrefl.Frame:
+    return ldtrefl.render(loaded(path), method=method)
+
+
+@pytest.mark.parametrize("path", ALL, ids=name_of)
+@pytest.mark.parametrize("method", ["ldt", "envmap"])
+def test_scene_reaches_its_ssim(path: Path, method: str) -> None:
+    expected = loaded(path).expect[method].ssim
+    truth = frame(path, "bvh")
+    value = metrics.ssim(frame(path, method).image, truth.image, truth.reflector_mask)
+    assert value >= expected, f"{method} on {name_of(path)}: SSIM {value:.4f}, {expected} expected"
+
+
+@pytest.mark.parametrize("path", ALL, ids=name_of)
+def test_environment_map_is_worse_than_layered_depth_textures(path: Path) -> None:
+    truth = frame(path, "bvh")
+    ldt, envmap = (metrics.ssim(frame(path, m).image, truth.image, truth.reflector_mask) for m in ("ldt", "envmap"))
+    assert envmap < ldt - 0.005
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=name_of)
+def test_frames_are_whole(path: Path) -> None:
+    for method in ("bvh", "ldt", "envmap"):
+        made = frame(path, method)
+        assert made.image.dtype == made.reflection.dtype == np.float32
+        assert np.isfinite(made.image).all() and np.isfinite(made.reflection).all()
+        assert made.reflector_mask.any() and not made.reflection[~made.reflector_mask].any()
+        np.testing.assert_array_equal(made.reflector_mask, frame(path, "bvh").reflector_mask)
+        assert {"gbuffer", "shade"} <= set(made.stats.seconds)
+        assert {"pixels", "reflector_pixels", "rays"} <= set(made.stats.counters)
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=name_of)
+def test_same_bits_for_any_number_of_threads_and_from_run_to_run(path: Path) -> None:
+    for method in ("bvh", "ldt", "envmap"):
+        for threads in (1, 2, 3):
+            ldtrefl.set_threads(threads)
+            again = ldtrefl.render(loaded(path), method=method)
+            np.testing.assert_array_equal(again.image, frame(path, method).image)
+
+
+def test_renderer_keeps_what_it_made_and_follows_the_camera() -> None:
+    scene = loaded(SCENES / "teapot.toml")
+    renderer = ldtrefl.Renderer(scene, "ldt", resolution=64)
+    first, second = renderer.render(), renderer.render()
+    np.testing.assert_array_equal(first.image, second.image)
+    assert first.stats.counters["objects_peeled"] > 0 and "objects_peeled" not in second.stats.counters
+    moved = dataclasses.replace(scene.camera, eye=(1.5, -4.5, 1.0), width=200, height=100)
+    np.testing.assert_array_equal(
+        renderer.render(camera=moved).image, ldtrefl.render(scene.with_camera(moved), "ldt", resolution=64).image
+    )
+
+
+def test_contact_shows_no_gap() -> None:
+    """The hollow box touches the ball: next to the contact, distances go down to 0 as the truth's do."""
+    made, truth = frame(SCENES / "hollow_box.toml", "ldt").hits, frame(SCENES / "hollow_box.toml", "bvh").hits
+    assert made is not None and truth is not None
+    texel = 1.0 / 256
+    assert truth.distance.min() < 0.02 and made.distance.min() < truth.distance.min() + texel
+    near = truth.distance < 0.1
+    assert near.sum() > 200 and (made.object[near] == truth.object[near]).mean() > 0.99
