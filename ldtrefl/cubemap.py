@@ -2,7 +2,8 @@
 
 *Texel space* is an object's unit space scaled so that a texel is 1 wide along every axis; the map's box is
 ``0 <= p <= size``, ``size`` whole texels along x, y and z. The map of axis ``a`` looks along ``a``: its texel (u, v)
-covers ``u <= p[a+1] < u+1`` and ``v <= p[a+2] < v+1`` (axes modulo 3), texel centres at +0.5, and its depth is ``p[a]``.
+covers ``u <= p[a+1] < u+1`` and ``v <= p[a+2] < v+1`` (axes modulo 3), texel centres at +0.5, and its depth is
+``p[a]``.
 
 Faces 0..5 = +x, -x, +y, -y, +z, -z. Face ``2a`` looks from the box's high end of axis ``a`` down, face ``2a + 1`` from
 its low end up. Both see the same surfaces in opposite order, so one sorted list per axis serves two faces.

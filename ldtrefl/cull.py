@@ -20,7 +20,7 @@ import numpy as np
 import warp as wp
 
 from ldtrefl import launch
-from ldtrefl.device_scene import DeviceScene, ObjectRecord
+from ldtrefl.device_scene import ObjectRecord
 from ldtrefl.gbuffer import GBuffer
 
 CullTest = Literal["safe", "flat", "none"]
@@ -124,9 +124,7 @@ def shows_safe(eye: wp.vec3, mirror: MirrorTriangle, centre: wp.vec3, radius: fl
     """Whether a ray reflected at the triangle may meet the sphere; False only if none can."""
     # The triangle lies in a ball about its centre, seen from the eye within a cone.
     middle = (mirror.a + mirror.b + mirror.c) / 3.0
-    reach = wp.max(
-        wp.length(mirror.a - middle), wp.max(wp.length(mirror.b - middle), wp.length(mirror.c - middle))
-    )
+    reach = wp.max(wp.length(mirror.a - middle), wp.max(wp.length(mirror.b - middle), wp.length(mirror.c - middle)))
     view = middle - eye
     distance = wp.length(view)
     if distance <= reach:

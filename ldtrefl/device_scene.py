@@ -1,9 +1,9 @@
 """The scene as kernels see it: geometry, places and materials in device arrays.
 
 Three spaces. *World*: the scene file's. *Device*: the world moved and scaled alike along all axes so that the objects
-fill the unit box about 0; all rays and positions in kernels are in it, so float32 holds at any scale and offset. *Unit*:
-an object's own vertices with their bounding box's longest side from -1 to 1. The matrices between them are composed in
-float64. Objects with the same mesh share its arrays: a moved object moves its rays, never its maps.
+fill the unit box about 0; all rays and positions in kernels are in it, so float32 holds at any scale and offset.
+*Unit*: an object's own vertices with their bounding box's longest side from -1 to 1. The matrices between them are
+composed in float64. Objects with the same mesh share its arrays: a moved object moves its rays, never its maps.
 """
 
 from __future__ import annotations

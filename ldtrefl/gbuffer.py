@@ -206,7 +206,12 @@ def find_surfaces(
     if gbuffer.object[i] >= 0:
         view = pixel_view(gbuffer, objects, i)
         surface = surface_at(
-            objects, gbuffer.object[i], gbuffer.triangle[i], gbuffer.barycentrics[i][0], gbuffer.barycentrics[i][1], view
+            objects,
+            gbuffer.object[i],
+            gbuffer.triangle[i],
+            gbuffer.barycentrics[i][0],
+            gbuffer.barycentrics[i][1],
+            view,
         )
         position_out[i] = surface.position
         normal_out[i] = surface.normal

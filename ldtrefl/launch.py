@@ -9,6 +9,7 @@ that stays the same for every slicing, so the bits do not depend on the number o
 from __future__ import annotations
 
 import functools
+import itertools
 import os
 import sys
 import tempfile
@@ -37,10 +38,18 @@ KERNELS: list[wp.Kernel] = []
 NO_DRIVER = b"Could not find or load the NVIDIA CUDA driver"
 """What Warp says at its start on a machine without a GPU."""
 
-_threads = os.cpu_count() or 1
-_pool: ThreadPoolExecutor | None = None
-_observer: Callable[[str, float], None] | None = None
-_stage = ""
+
+@dataclass
+class _State:
+    """What one process shares."""
+
+    threads: int = os.cpu_count() or 1
+    pool: ThreadPoolExecutor | None = None
+    observer: Callable[[str, float], None] | None = None
+    stage: str = ""
+
+
+_state = _State()
 
 
 def kernel(function: Callable[..., None]) -> wp.Kernel:
@@ -56,20 +65,19 @@ def set_threads(threads: int | None = None) -> None:
     Raises:
         InputError: ``threads`` is not a whole number of at least 1.
     """
-    global _threads, _pool
     if threads is None:
         threads = os.cpu_count() or 1
     if not isinstance(threads, int) or isinstance(threads, bool) or not 1 <= threads <= 1024:
         raise InputError(f"threads must be a whole number from 1 to 1024, got {threads!r}")
-    if threads != _threads and _pool is not None:
-        _pool.shutdown()
-        _pool = None
-    _threads = threads
+    if threads != _state.threads and _state.pool is not None:
+        _state.pool.shutdown()
+        _state.pool = None
+    _state.threads = threads
 
 
 def thread_count() -> int:
     """CPU threads in use."""
-    return _threads
+    return _state.threads
 
 
 @functools.cache
@@ -109,12 +117,11 @@ def resolve_device(name: str | None) -> wp.Device:
 @contextmanager
 def progress_to(observer: Callable[[str, float], None]) -> Iterator[None]:
     """Report every finished slice to ``observer(stage, fraction of the launch)`` inside this block."""
-    global _observer
-    before, _observer = _observer, observer
+    before, _state.observer = _state.observer, observer
     try:
         yield
     finally:
-        _observer = before
+        _state.observer = before
 
 
 def launch(kernel: wp.Kernel, count: int, arguments: Sequence[Any], device: wp.Device) -> None:
@@ -124,12 +131,13 @@ def launch(kernel: wp.Kernel, count: int, arguments: Sequence[Any], device: wp.D
     if not device.is_cpu:
         wp.launch(kernel, dim=count, inputs=[0, *arguments], device=device)
         return
-    slices = min(_threads * SLICES_PER_THREAD, -(-count // MIN_SLICE)) if _threads > 1 or _observer else 1
+    is_cut = _state.threads > 1 or _state.observer is not None
+    slices = min(_state.threads * SLICES_PER_THREAD, -(-count // MIN_SLICE)) if is_cut else 1
     bounds = [count * i // slices for i in range(slices + 1)]
     _run(
         kernel,
         device,
-        [(end - first, [first, *arguments]) for first, end in zip(bounds[:-1], bounds[1:], strict=True)],
+        [(end - first, [first, *arguments]) for first, end in itertools.pairwise(bounds)],
     )
 
 
@@ -142,7 +150,7 @@ def launch_parts(kernel: wp.Kernel, count: int, arguments: Sequence[Any], device
     """
     if count <= 0:
         return
-    parts = parts or (_threads if device.is_cpu else 1)
+    parts = parts or (_state.threads if device.is_cpu else 1)
     if not device.is_cpu:
         for part in range(parts):
             wp.launch(kernel, dim=count, inputs=[part, parts, *arguments], device=device)
@@ -151,24 +159,23 @@ def launch_parts(kernel: wp.Kernel, count: int, arguments: Sequence[Any], device
 
 
 def _run(kernel: wp.Kernel, device: wp.Device, slices: list[tuple[int, list[Any]]]) -> None:
-    global _pool
     kernel.module.load(device)  # once, before any thread: loading is not safe from several
-    if len(slices) == 1 or _threads == 1:
+    if len(slices) == 1 or _state.threads == 1:
         for done, (count, arguments) in enumerate(slices, 1):
             wp.launch(kernel, dim=count, inputs=arguments, device=device)
             _report(done / len(slices))
         return
-    if _pool is None:
-        _pool = ThreadPoolExecutor(_threads, thread_name_prefix="ldtrefl")
-    futures = [_pool.submit(wp.launch, kernel, count, arguments, device=device) for count, arguments in slices]
+    if _state.pool is None:
+        _state.pool = ThreadPoolExecutor(_state.threads, thread_name_prefix="ldtrefl")
+    futures = [_state.pool.submit(wp.launch, kernel, count, arguments, device=device) for count, arguments in slices]
     for done, future in enumerate(as_completed(futures), 1):
         future.result()
         _report(done / len(slices))
 
 
 def _report(fraction: float) -> None:
-    if _observer is not None:
-        _observer(_stage, fraction)
+    if _state.observer is not None:
+        _state.observer(_state.stage, fraction)
 
 
 @dataclass
@@ -181,8 +188,7 @@ class Stats:
     @contextmanager
     def stage(self, name: str, device: wp.Device) -> Iterator[None]:
         """Add the time of this block to ``seconds[name]``, the device's work included."""
-        global _stage
-        outer, _stage = _stage, name
+        outer, _state.stage = _state.stage, name
         _report(0.0)
         start = time.perf_counter()
         try:
@@ -191,7 +197,7 @@ class Stats:
                 wp.synchronize_device(device)
         finally:
             self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
-            _stage = outer
+            _state.stage = outer
 
     def count(self, name: str, amount: int) -> None:
         """Add ``amount`` to ``counters[name]``."""

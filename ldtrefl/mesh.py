@@ -21,6 +21,10 @@ MAX_TRIANGLES = 1 << 30
 """Triangle numbers are int32 and a fragment keeps one bit of it for the facing."""
 
 
+LARGEST_COORDINATE = 1e100
+"""Sizes and their squares stay finite in float64."""
+
+
 @dataclass(frozen=True, eq=False)
 class Part:
     """A run of triangles with one look: a material of the mesh's file."""
@@ -63,10 +67,10 @@ class Mesh:
             raise InputError(
                 f"triangle {first} has vertices {faces[first].tolist()}, allowed are 0 to {len(vertices) - 1}"
             )
-        wrong = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
+        wrong = np.flatnonzero(~(np.abs(vertices) <= LARGEST_COORDINATE).all(axis=1))
         if len(wrong):
             first = int(wrong[0])
-            raise InputError(f"vertex {first} is not finite: {vertices[first].tolist()}")
+            raise InputError(f"vertex {first} is not finite or too large: {vertices[first].tolist()}")
         faces = faces.astype(np.int32)
         normals = self.normals
         normals = smooth_normals(vertices, faces) if normals is None else _array(normals, np.float32, 3, "normals")
@@ -99,7 +103,7 @@ class Mesh:
 
 def _array(values: Any, dtype: type, width: int, name: str) -> np.ndarray:
     try:
-        array = np.ascontiguousarray(values, dtype)
+        array: np.ndarray = np.ascontiguousarray(values, dtype)
     except (TypeError, ValueError) as error:
         raise InputError(f"{name} must be numbers of shape (n, {width}), got {type(values).__name__}") from error
     if array.ndim != 2 or array.shape[1] != width:
@@ -176,7 +180,7 @@ def _joined(pieces: list[trimesh.Trimesh]) -> Mesh:
         uv = _uvs(piece)
         vertices.append(checked.vertices)
         faces.append(checked.faces + vertex_count)
-        normals.append(checked.normals)
+        normals.append(np.asarray(checked.normals))
         uvs.append(np.zeros((len(checked.vertices), 2), np.float32) if uv is None else uv)
         color, texture = _look(piece)
         parts.append(Part(triangle_count, color, texture if uv is not None else None))

@@ -185,7 +185,9 @@ def insertion_sort(depth: wp.array(dtype=wp.float32), reference: wp.array(dtype=
 
 
 @wp.func
-def sift_down(depth: wp.array(dtype=wp.float32), reference: wp.array(dtype=wp.int32), first: int, root: int, count: int):
+def sift_down(
+    depth: wp.array(dtype=wp.float32), reference: wp.array(dtype=wp.int32), first: int, root: int, count: int
+):
     """Restore the heap below ``root``."""
     d = depth[first + root]
     r = reference[first + root]

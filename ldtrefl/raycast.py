@@ -39,9 +39,7 @@ def closest_hit_bvh(
 
 
 @wp.func
-def occluded_bvh(
-    views: wp.array(dtype=BvhView), index: int, origin: wp.vec3, direction: wp.vec3, t_max: float
-) -> bool:
+def occluded_bvh(views: wp.array(dtype=BvhView), index: int, origin: wp.vec3, direction: wp.vec3, t_max: float) -> bool:
     """The tracer's ``occluded``."""
     return wp.mesh_query_ray_anyhit(views[index].mesh, origin, direction, t_max)
 

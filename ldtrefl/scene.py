@@ -43,9 +43,7 @@ Whole = Annotated[int, Field(strict=True)]
 Flag = Annotated[bool, Field(strict=True)]
 Text = Annotated[str, Field(strict=True, min_length=1)]
 Vector = tuple[Number, Number, Number]
-Color = tuple[
-    Annotated[Number, Field(ge=0.0)], Annotated[Number, Field(ge=0.0)], Annotated[Number, Field(ge=0.0)]
-]
+Color = tuple[Annotated[Number, Field(ge=0.0)], Annotated[Number, Field(ge=0.0)], Annotated[Number, Field(ge=0.0)]]
 Reflectance = tuple[
     Annotated[Number, Field(ge=0.0, le=1.0)],
     Annotated[Number, Field(ge=0.0, le=1.0)],
@@ -62,10 +60,9 @@ def _nonzero(vector: tuple[float, float, float]) -> tuple[float, float, float]:
 Direction = Annotated[Vector, AfterValidator(_nonzero)]
 
 _CONFIG = ConfigDict(extra="forbid", arbitrary_types_allowed=True, populate_by_name=True)
-_settings = functools.partial(dataclass, frozen=True, kw_only=True, config=_CONFIG)
 
 
-@_settings()
+@dataclass(frozen=True, kw_only=True, config=_CONFIG)
 class Camera:
     """A pinhole camera; pixel centres at +0.5, row 0 at the top."""
 
@@ -88,7 +85,7 @@ class Camera:
         return self
 
 
-@_settings()
+@dataclass(frozen=True, kw_only=True, config=_CONFIG)
 class Environment:
     """What a ray that hits nothing sees: a blend by height, or an equirectangular image."""
 
@@ -97,7 +94,7 @@ class Environment:
     image: Text | None = None
 
 
-@_settings()
+@dataclass(frozen=True, kw_only=True, config=_CONFIG)
 class Lighting:
     """What all lights share."""
 
@@ -106,7 +103,7 @@ class Lighting:
     shadows: Flag = False
 
 
-@_settings()
+@dataclass(frozen=True, kw_only=True, config=_CONFIG)
 class Light:
     """A directional or a point light."""
 
@@ -130,7 +127,7 @@ class Light:
         return self
 
 
-@_settings()
+@dataclass(frozen=True, kw_only=True, config=_CONFIG)
 class Material:
     """``emission + albedo * texture * light + mirror * reflected radiance``."""
 
@@ -144,7 +141,7 @@ class Material:
     """Schlick's approximation, with ``mirror`` as the reflectance at normal incidence."""
 
 
-@_settings()
+@dataclass(frozen=True, kw_only=True, config=_CONFIG)
 class Object:
     """A mesh or a shape, placed: fit, then scale, rotate, translate."""
 
@@ -225,7 +222,7 @@ def _rotation(axis_and_degrees: tuple[float, float, float, float]) -> np.ndarray
     return matrix
 
 
-@_settings()
+@dataclass(frozen=True, kw_only=True, config=_CONFIG)
 class Reflection:
     """The scene's defaults for rendering; the caller's and the command line's win."""
 
@@ -233,14 +230,14 @@ class Reflection:
     max_bounces: Annotated[Whole, Field(ge=1, le=64)] = 1
 
 
-@_settings()
+@dataclass(frozen=True, kw_only=True, config=_CONFIG)
 class Expectation:
     """What the image tests hold a method to in this scene."""
 
     ssim: Annotated[float, Field(strict=True, ge=0.0, le=1.0)]
 
 
-@_settings()
+@dataclass(frozen=True, kw_only=True, config=_CONFIG)
 class Scene:
     """A camera, lights and objects."""
 
@@ -269,8 +266,9 @@ def _allowed_keys(kind: type, table: str = "") -> dict[str, list[str]]:
     """Table key -> the keys it may hold, for every table below ``kind``."""
     keys: dict[str, list[str]] = {table: []}
     hints = typing.get_type_hints(kind)
+    fields: dict[str, Any] = vars(kind)["__pydantic_fields__"]
     for entry in dataclasses.fields(kind):
-        name = getattr(kind, "__pydantic_fields__")[entry.name].alias or entry.name
+        name = fields[entry.name].alias or entry.name
         keys[table].append(name)
         for inner in [hints[entry.name], *typing.get_args(hints[entry.name])]:
             if dataclasses.is_dataclass(inner) and inner is not Mesh and isinstance(inner, type):
@@ -329,9 +327,10 @@ def _found(scene: Scene, path: Path) -> Scene:
 
 def _beside(scene_path: Path, name: str, key: str) -> str:
     """The file called ``name`` beside the scene, or else in the folders of LDTREFL_MESH_PATH."""
-    folders = [scene_path.parent, *filter(None, os.environ.get(MESH_PATH_VARIABLE, "").split(os.pathsep))]
+    listed = os.environ.get(MESH_PATH_VARIABLE, "").split(os.pathsep)
+    folders = [scene_path.parent, *(Path(folder) for folder in listed if folder)]
     for folder in folders:
-        candidate = Path(folder) / name
+        candidate = folder / name
         try:
             if candidate.is_file():
                 return str(candidate)

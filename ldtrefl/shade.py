@@ -90,7 +90,7 @@ def mirror_direction(direction: wp.vec3, normal: wp.vec3) -> wp.vec3:
 
 @wp.func
 def surface_at(objects: wp.array(dtype=ObjectRecord), index: int, triangle: int, u: float, v: float, view: wp.vec3):
-    """The surface of object ``index`` at barycentrics (u, v) of ``triangle``, seen along the unit direction ``view``."""
+    """The surface of object ``index`` at barycentrics (u, v) of ``triangle``, seen along unit direction ``view``."""
     corners = objects[index].faces[triangle]
     w = 1.0 - u - v
     a, b, c = (
@@ -140,7 +140,7 @@ def surface_at(objects: wp.array(dtype=ObjectRecord), index: int, triangle: int,
 
 
 def make_direct_radiance(is_lit: Any) -> Any:
-    """The function ``direct_radiance(view set, objects, lighting, surface)`` -> emitted and diffusely scattered radiance.
+    """The function ``direct_radiance(views, objects, lighting, surface)`` -> emitted and diffusely scattered radiance.
 
     ``is_lit(views, objects, surface, direction, distance)`` answers whether light arrives from unit ``direction``, from
     a light at ``distance``; it closes over a tracer, so shadows exist once for all tracers.

@@ -10,7 +10,7 @@ from __future__ import annotations
 import functools
 import inspect
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Annotated, Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from pydantic import ConfigDict, Field, ValidationError, validate_call
 from skimage.measure import marching_cubes
 
 from ldtrefl import teapot_patches
-from ldtrefl.errors import InputError, first_fault, unknown_name
+from ldtrefl.errors import first_fault, unknown_name
 from ldtrefl.mesh import Mesh
 
 Segments = Annotated[int, Field(strict=True, ge=1, le=4096)]
@@ -115,8 +115,8 @@ def _fitted(mesh: Mesh) -> Mesh:
     return Mesh((mesh.vertices - centre) / half, mesh.faces, mesh.normals, mesh.uvs)
 
 
-def _rectangle(corners: list[list[float]], segments: int) -> Mesh:
-    """A flat quadrilateral, corners counter-clockwise, with its facet normal."""
+def _rectangle(corners: Sequence[Sequence[float] | np.ndarray], segments: int) -> Mesh:
+    """A flat quadrilateral, corners counter-clockwise from the texture's lower left, with its facet normal."""
     a, b, c, d = np.array(corners, float)
     s = np.linspace(0.0, 1.0, segments + 1)
     # Weights of (1 - s, s) form give bit-equal points along a shared edge whichever way it is walked.
@@ -129,15 +129,13 @@ def _rectangle(corners: list[list[float]], segments: int) -> Mesh:
 
 
 def _box_sides(segments: int, *, inwards: bool = False) -> list[Mesh]:
+    """The six sides of the box from -1 to 1, textures upright on the four that stand."""
+    x, y, z = np.eye(3)
     sides = []
-    for axis in range(3):
-        for sign in (1.0, -1.0):
-            corners = []
-            for s, t in ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)):
-                corner = [0.0, 0.0, 0.0]
-                corner[axis], corner[(axis + 1) % 3], corner[(axis + 2) % 3] = sign, s, t
-                corners.append(corner)
-            sides.append(_rectangle(corners if (sign > 0) != inwards else corners[::-1], segments))
+    for out, right, up in ((x, y, z), (-x, -y, z), (y, -x, z), (-y, x, z), (z, x, y), (-z, -x, y)):
+        across = -right if inwards else right
+        corners = [out + s * across + t * up for s, t in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+        sides.append(_rectangle(corners, segments))
     return sides
 
 
@@ -218,9 +216,7 @@ def torus(minor: Fraction = 0.35, segments: tuple[Around, Around] = (192, 96)) -
         around, up = np.cos(2 * np.pi * v)[:, None], np.sin(2 * np.pi * v)[:, None]
         return around * ring(u) + up * np.array([0.0, 0.0, 1.0])
 
-    return _parametric(
-        lambda u, v: ring(u) + minor * normal(u, v), *segments, wrap_u=True, wrap_v=True, normal=normal
-    )
+    return _parametric(lambda u, v: ring(u) + minor * normal(u, v), *segments, wrap_u=True, wrap_v=True, normal=normal)
 
 
 @_shape
@@ -318,10 +314,12 @@ def teapot(segments: Segments = 16) -> Mesh:
     """The Utah teapot from its Bezier patches, ``segments`` along a patch's edge. One sheet: lid and body are open."""
     t = np.linspace(0.0, 1.0, segments + 1)
     bernstein = np.stack([(1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t), t**3], 1)
-    vertices, faces, uvs = [], [], []
+    vertices: list[np.ndarray] = []
+    faces: list[np.ndarray] = []
+    uvs: list[np.ndarray] = []
 
     def add(patch: tuple[int, ...], mirror: tuple[int, int]) -> None:
-        control = teapot_patches.POINTS[list(patch)].reshape(4, 4, 3) * [*mirror, 1]
+        control = teapot_patches.POINTS[list(patch)].reshape(4, 4, 3) * np.array([*mirror, 1.0])
         points = np.einsum("ui,vj,ijk->uvk", bernstein, bernstein, control).reshape(-1, 3)
         points[np.abs(points) < 1e-12] = 0.0  # on a mirror plane both sides must meet exactly
         grid = _grid(segments, segments)
@@ -351,8 +349,8 @@ def wires(
     wire = _revolved(np.array([[0.0, -1.0], [radius, -1.0], [radius, 1.0], [0.0, 1.0]]), segments)
     places = np.linspace(radius - 1.0, 1.0 - radius, count) if count > 1 else np.zeros(1)
     along_x, along_y = wire.vertices[:, [2, 0, 1]], wire.vertices[:, [1, 2, 0]]
-    pieces = [Mesh(along_x + [0.0, place, radius], wire.faces) for place in places]
-    pieces += [Mesh(along_y + [place, 0.0, -radius], wire.faces) for place in places]
+    pieces = [Mesh(along_x + np.array([0.0, place, radius]), wire.faces) for place in places]
+    pieces += [Mesh(along_y + np.array([place, 0.0, -radius]), wire.faces) for place in places]
     return _join(*pieces)
 
 

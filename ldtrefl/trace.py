@@ -148,8 +148,9 @@ def trace_batch(tracer: Tracer, views: wp.array, geometry: DeviceMesh, origins: 
     invalid = wp.zeros(n, dtype=wp.uint8, device=device)
     inputs = [views, geometry.vertices, geometry.faces, wp.vec3d(*centre), wp.float64(half), starts, ways]
     launch.launch(batch_kernel(tracer), n, [*inputs, t, normal, triangle, barycentrics, invalid], device)
-    arrays = (t, normal, triangle, barycentrics)
-    return Hits(*(arrays if as_warp else (a.numpy() for a in arrays)), invalid=int(invalid.numpy().sum()))
+    as_asked = (lambda array: array) if as_warp else (lambda array: array.numpy())
+    bad = int(invalid.numpy().sum())
+    return Hits(as_asked(t), as_asked(normal), as_asked(triangle), as_asked(barycentrics), bad)
 
 
 def _ray_array(rays: Any, name: str, device: wp.Device) -> wp.array:

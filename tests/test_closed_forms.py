@@ -108,7 +108,9 @@ def test_diffuse_radiance_of_one_light() -> None:
         objects=(floor,),
     )
     image = ldtrefl.render(scene, "bvh").image
-    np.testing.assert_allclose(image, np.broadcast_to([0.5 * 1.2 + 0.1, 0.25 * 1.2 + 0.2, 1.2 + 0.3], image.shape), 1e-5)
+    np.testing.assert_allclose(
+        image, np.broadcast_to([0.5 * 1.2 + 0.1, 0.25 * 1.2 + 0.2, 1.2 + 0.3], image.shape), 1e-5
+    )
 
 
 def test_point_light_falls_off_with_the_square_of_the_distance_at_any_scale() -> None:

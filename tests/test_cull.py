@@ -58,7 +58,9 @@ def random_cases(n: int, bend: float) -> dict[str, np.ndarray]:
 
 def answers(case: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     device, n = launch.resolve_device(None), len(case["radius"])
-    vectors = [wp.array(case[k].astype(np.float32), dtype=wp.vec3, device=device) for k in ("eye", "corners", "normals")]
+    vectors = [
+        wp.array(case[k].astype(np.float32), dtype=wp.vec3, device=device) for k in ("eye", "corners", "normals")
+    ]
     centre = wp.array(case["centre"].astype(np.float32), dtype=wp.vec3, device=device)
     radius = wp.array(case["radius"].astype(np.float32), dtype=float, device=device)
     flat, safe = (wp.zeros(n, dtype=int, device=device) for _ in range(2))

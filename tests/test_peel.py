@@ -1,5 +1,6 @@
 """Peeling: no cracks, any depth, known layer counts, the same bits for any number of threads."""
 
+import itertools
 from collections.abc import Callable
 from pathlib import Path
 
@@ -81,7 +82,7 @@ def test_texels_are_sorted_by_depth_then_triangle() -> None:
     maps = ldtrefl.peel(np.column_stack([xy, height]), np.arange(900).reshape(-1, 3), resolution=16)
     start, depth, reference = (x.numpy() for x in (maps.start, maps.depth, maps.reference))
     assert np.diff(start).max() == 300
-    for first, end in zip(start[:-1], start[1:], strict=True):
+    for first, end in itertools.pairwise(start):
         order = np.lexsort((reference[first:end], depth[first:end]))
         np.testing.assert_array_equal(order, np.arange(end - first))
 

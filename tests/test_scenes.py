@@ -88,6 +88,6 @@ def test_contact_shows_no_gap() -> None:
     made, truth = frame(SCENES / "hollow_box.toml", "ldt").hits, frame(SCENES / "hollow_box.toml", "bvh").hits
     assert made is not None and truth is not None
     texel = 1.0 / 256
-    assert truth.distance.min() < 0.02 and made.distance.min() < truth.distance.min() + texel
+    assert truth.distance.min() < 0.03 and made.distance.min() < truth.distance.min() + texel
     near = truth.distance < 0.1
     assert near.sum() > 200 and (made.object[near] == truth.object[near]).mean() > 0.99

@@ -52,6 +52,11 @@ def test_size_place_and_normals(name: str) -> None:
         assert mesh.uvs.min() >= 0.0 and mesh.uvs.max() <= 1.0
 
 
+@pytest.mark.parametrize("name", ["box", "room", "hollow_box"])
+def test_boxes_stay_closed_when_cut_into_segments(name: str) -> None:
+    assert welded(name, {"segments": 7}).is_watertight
+
+
 def test_open_bowl_is_one_sheet() -> None:
     assert not welded("bowl", {"closed": False}).is_watertight
 

@@ -1,0 +1,31 @@
+"""Every kernel compiles for CUDA; no GPU is needed for that."""
+
+from pathlib import Path
+
+import pytest
+import warp as wp
+
+from ldtrefl import launch
+from ldtrefl.march import TRACERS
+from ldtrefl.raycast import BVH
+from ldtrefl.reflect import NOTHING, closest_hits_kernel, shade_hits_kernel, shade_pixels_kernel
+from ldtrefl.render import Renderer  # noqa: F401  (imports every module that defines kernels)
+from ldtrefl.trace import batch_kernel
+
+
+def all_kernels() -> list[wp.Kernel]:
+    for tracer in (BVH, *TRACERS.values()):
+        batch_kernel(tracer)
+        closest_hits_kernel(tracer)
+    for tracer in (NOTHING, BVH, *TRACERS.values()):
+        shade_hits_kernel(tracer)
+        shade_pixels_kernel(tracer)
+    return [kernel for kernel in launch.KERNELS if kernel.func.__module__.startswith("ldtrefl.")]
+
+
+@pytest.mark.parametrize("kernel", all_kernels(), ids=lambda kernel: kernel.module.name)
+def test_kernel_compiles_to_ptx(kernel: wp.Kernel, tmp_path: Path) -> None:
+    launch.resolve_device(None)
+    wp.compile_aot_module(kernel.module, arch=86, module_dir=tmp_path, use_ptx=True)
+    made = list(tmp_path.rglob("*.ptx"))
+    assert made and all(b".entry" in path.read_bytes() for path in made)
