@@ -23,18 +23,22 @@ FARTHEST_SHADE = 0.45
 
 def draw_layers(maps: LayeredDepthTexture) -> np.ndarray:
     """(h, w, 3) linear: layer 1 of the six faces in the first row, and so on until a layer draws nothing."""
-    layers = maps.layers()
-    rows = max(1, *layers.values())
+    layers = list(maps.layers().values())
+    faces = [_face_layers(maps, face, count) for face, count in enumerate(layers)]
     tile = maps.resolution
-    sheet = np.ones((LABEL_HEIGHT + rows * (tile + MARGIN) + MARGIN, 6 * (tile + MARGIN) + MARGIN, 3), np.float32)
-    sheet[:] = BACKGROUND
-    for face in range(6):
-        for layer, picture in enumerate(_face_layers(maps, face, rows)):
-            height, width = picture.shape[:2]
-            top = LABEL_HEIGHT + MARGIN + layer * (tile + MARGIN) + (tile - height) // 2
-            left = MARGIN + face * (tile + MARGIN) + (tile - width) // 2
-            sheet[top : top + height, left : left + width] = picture
-    return linear_from_srgb(_labelled(sheet, tile, list(layers.values())))
+    rows = [[pictures[row] if row < len(pictures) else None for pictures in faces] for row in range(max(1, *layers))]
+    heights = [max((picture.shape[0] for picture in row if picture is not None), default=1) for row in rows]
+    size = (LABEL_HEIGHT + sum(heights) + MARGIN * (len(rows) + 1), 6 * (tile + MARGIN) + MARGIN, 3)
+    sheet = np.full(size, BACKGROUND, np.float32)
+    top = LABEL_HEIGHT + MARGIN
+    for row, height in zip(rows, heights, strict=True):
+        for face, picture in enumerate(row):
+            if picture is not None:
+                h, w = picture.shape[:2]
+                y, x = top + (height - h) // 2, MARGIN + face * (tile + MARGIN) + (tile - w) // 2
+                sheet[y : y + h, x : x + w] = picture
+        top += height + MARGIN
+    return linear_from_srgb(_labelled(sheet, tile, layers))
 
 
 def _face_layers(maps: LayeredDepthTexture, face: int, count: int) -> list[np.ndarray]:
@@ -66,7 +70,7 @@ def _face_layers(maps: LayeredDepthTexture, face: int, count: int) -> list[np.nd
 
     pictures = []
     for number in range(count):
-        picture = np.ones((rows * columns, 3), np.float32) * BACKGROUND
+        picture = np.full((rows * columns, 3), BACKGROUND, np.float32)
         picture[texel[layer == number]] = color[layer == number]
         pictures.append(_upright(picture.reshape(rows, columns, 3), face))
     return pictures
