@@ -5,7 +5,7 @@ The pipeline, one module a stage:
     scene file -> Scene (scene, shapes, mesh) -> arrays on the device (device_scene)
       -> G-buffer: what the camera sees (gbuffer, raster)
       -> a method (methods/): its tracer answers reflected rays (trace), whose life is written once (reflect)
-           ldt: cull (cull), peel on first need (peel -> ldt, fragments), march (march)
+           ldt: cull (cull), peel on first need (peel -> ldt: fragments, grid), march (march)
            bvh: the ground truth (raycast)
       -> shade, the same functions for all (shade) -> composite (render) -> image (image), compared (metrics)
 """
@@ -13,9 +13,8 @@ The pipeline, one module a stage:
 from ldtrefl.errors import InputError
 from ldtrefl.image import load_image, save_image
 from ldtrefl.launch import Stats, set_threads
-from ldtrefl.ldt import LayeredDepthTexture
+from ldtrefl.ldt import LayeredDepthTexture, peel
 from ldtrefl.mesh import Mesh, load_mesh
-from ldtrefl.peel import peel
 from ldtrefl.raycast import Raycaster
 from ldtrefl.render import Frame, Renderer, render
 from ldtrefl.scene import (

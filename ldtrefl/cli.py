@@ -26,9 +26,9 @@ from ldtrefl.device_scene import DeviceMesh
 from ldtrefl.errors import InputError
 from ldtrefl.image import check_writable, difference_image, save_image
 from ldtrefl.layers import draw_layers
+from ldtrefl.ldt import DEFAULT_RESOLUTION, peel_mesh
 from ldtrefl.mesh import Mesh, load_mesh
 from ldtrefl.methods import all_methods, find_method
-from ldtrefl.peel import DEFAULT_RESOLUTION, peel_mesh
 from ldtrefl.render import Frame, Renderer
 from ldtrefl.scene import Scene, load_scene
 
@@ -143,9 +143,9 @@ def peel(
     path = None if output is None else check_writable(output)
     target = launch.resolve_device(device)
     geometry = DeviceMesh.upload(_mesh_or_shape(mesh), target)
-    peel_mesh(geometry, 16)  # compiles the kernels, so that the time below is peeling's own
+    peel_mesh(geometry, 16, search="linear")  # compiles the kernels, so that the time below is peeling's own
     start = time.perf_counter()
-    maps = peel_mesh(geometry, resolution)
+    maps = peel_mesh(geometry, resolution, search="linear")
     seconds = time.perf_counter() - start
     if path is not None:
         save_image(path, draw_layers(maps))
@@ -326,7 +326,7 @@ def _mesh_info(mesh: Mesh) -> None:
     console.print(f"{len(mesh.faces)} triangles, {len(mesh.vertices)} vertices")
     console.print(f"from {low.tolist()} to {high.tolist()}")
     console.print(f"parts: {len(mesh.parts)}, textures: {textures}, UVs: {'no' if mesh.uvs is None else 'yes'}")
-    maps = peel_mesh(DeviceMesh.upload(mesh, launch.resolve_device(None)), 128)
+    maps = peel_mesh(DeviceMesh.upload(mesh, launch.resolve_device(None)), 128, search="linear")
     crossings = ", ".join(f"{axis} {count}" for axis, count in maps.crossings().items())
     console.print(f"surfaces over one texel at 128: {crossings}")
     odd = sum(int((maps.counts(axis) % 2).sum()) for axis in range(3))

@@ -16,6 +16,8 @@ import dataclasses
 import numpy as np
 import warp as wp
 
+from ldtrefl.mesh import Mesh
+
 FACE_NAMES = ("+x", "-x", "+y", "-y", "+z", "-z")
 
 
@@ -28,7 +30,7 @@ def texel_from_point(axis: int, p: wp.vec3) -> wp.vec3:
 @wp.func
 def point_from_texel(axis: int, t: wp.vec3) -> wp.vec3:
     """The texel-space point at (u, v, depth) of the map of ``axis``."""
-    return wp.vec3(t[(3 - axis) % 3], t[(4 - axis) % 3], t[(5 - axis) % 3])
+    return wp.vec3(t[(5 - axis) % 3], t[(3 - axis) % 3], t[(4 - axis) % 3])
 
 
 @wp.func
@@ -78,3 +80,10 @@ class TexelFrame:
         """Number of the first texel of each axis' map when the three stand in one row, and the total."""
         counts = [rows * columns for rows, columns in map(self.map_shape, range(3))]
         return 0, counts[0], counts[0] + counts[1], sum(counts)
+
+
+def texel_frame(mesh: Mesh, resolution: int) -> TexelFrame:
+    """The box of texels about a mesh."""
+    centre, half = mesh.unit_frame
+    low, high = ((bound - centre) / half for bound in mesh.bounds)
+    return TexelFrame.around(low, high, resolution)

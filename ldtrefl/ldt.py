@@ -1,28 +1,37 @@
-"""``LayeredDepthTexture``: an object's maps on the host side: trace, look, save and load."""
+"""``LayeredDepthTexture``: an object's maps on the host side, and ``peel``, which makes them from a mesh."""
 
 from __future__ import annotations
 
+import functools
 import os
 import tempfile
 import zipfile
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import warp as wp
+from pydantic import Field, TypeAdapter, ValidationError
 
 from ldtrefl import launch
-from ldtrefl.cubemap import FACE_NAMES, TexelFrame
+from ldtrefl.cubemap import FACE_NAMES, TexelFrame, texel_frame
 from ldtrefl.device_scene import DeviceMesh
-from ldtrefl.errors import InputError, unknown_name
+from ldtrefl.errors import InputError, first_fault, unknown_name
 from ldtrefl.fragments import LdtView
+from ldtrefl.grid import Grid, Quality, build_grid
 from ldtrefl.march import TRACERS
 from ldtrefl.mesh import Mesh
+from ldtrefl.peel import Rasteriser, sort_fragments
 from ldtrefl.trace import Hits, trace_batch
 
 FORMAT = 1
 """Of saved files; goes up when what they hold changes."""
+
+DEFAULT_RESOLUTION = 256
+"""Texels along an object's longest side."""
+
+DEFAULT_SEARCH = "exact"
+DEFAULT_QUALITY: Quality = "balanced"
 
 LINEAR_STEPS = 512
 """Default of ``linear_steps``: about one a texel along the diagonal of a 256 map."""
@@ -30,22 +39,49 @@ LINEAR_STEPS = 512
 BINARY_STEPS = 8
 """Default of ``binary_steps``: a texel's step is halved to less than a hundredth."""
 
+_RESOLUTION = TypeAdapter(Annotated[int, Field(strict=True, ge=1, le=4096)])
+_QUALITY = TypeAdapter(Quality)
 
-@dataclass(frozen=True, eq=False)
+
 class LayeredDepthTexture:
     """An object's surfaces in six orthographic maps (Zhang, Hsieh and Shen, section 3.3); see ``fragments.py``.
 
-    Made by :func:`ldtrefl.peel`. Object space is the object's own vertex coordinates.
+    Made by :func:`ldtrefl.peel`. Object space is the object's own vertex coordinates. The sorted maps and the
+    occupancy grid over them (``grid.py``) are each made when they are first asked for.
     """
 
-    geometry: DeviceMesh
-    frame: TexelFrame
-    start: wp.array
-    """(texels + 1,) int32: first fragment of each texel, the three axes' maps in a row."""
-    depth: wp.array
-    """(fragments,) float32, texels along the map's axis, sorted in each texel."""
-    reference: wp.array
-    """(fragments,) int32: triangle times 2, plus 1 if it faces up the axis."""
+    def __init__(self, geometry: DeviceMesh, frame: TexelFrame, quality: Quality = DEFAULT_QUALITY) -> None:
+        self.geometry = geometry
+        self.frame = frame
+        self.quality: Quality = quality
+
+    @functools.cached_property
+    def _rasteriser(self) -> Rasteriser:
+        return Rasteriser(self.geometry, self.frame)
+
+    @functools.cached_property
+    def _maps(self) -> tuple[wp.array, wp.array, wp.array]:
+        return sort_fragments(self.frame, self._rasteriser.fragments())
+
+    @functools.cached_property
+    def grid(self) -> Grid:
+        """The occupancy grid that the exact search walks."""
+        return build_grid(self.geometry, self.resolution, self.quality)
+
+    @property
+    def start(self) -> wp.array:
+        """(texels + 1,) int32: first fragment of each texel, the three axes' maps in a row."""
+        return self._maps[0]
+
+    @property
+    def depth(self) -> wp.array:
+        """(fragments,) float32, texels along the map's axis, sorted in each texel."""
+        return self._maps[1]
+
+    @property
+    def reference(self) -> wp.array:
+        """(fragments,) int32: triangle times 2, plus 1 if it faces up the axis."""
+        return self._maps[2]
 
     @property
     def resolution(self) -> int:
@@ -55,12 +91,13 @@ class LayeredDepthTexture:
     @property
     def fragment_count(self) -> int:
         """Fragments in the three maps; each serves two faces."""
-        return self.depth.shape[0]
+        return self._rasteriser.count
 
     @property
     def nbytes(self) -> int:
-        """Bytes that the maps take, the mesh not counted."""
-        return sum(array.size * 4 for array in (self.start, self.depth, self.reference))
+        """Bytes that the maps and the grid take so far, the mesh not counted."""
+        maps = sum(array.size * 4 for array in self._maps) if "_maps" in self.__dict__ else 0
+        return maps + (self.grid.nbytes if "grid" in self.__dict__ else 0)
 
     def counts(self, axis: int) -> np.ndarray:
         """(rows, columns) int32: fragments per texel of the map of ``axis``."""
@@ -86,10 +123,20 @@ class LayeredDepthTexture:
         """Per axis, the most surfaces over one texel."""
         return {name: int(self.counts(axis).max(initial=0)) for axis, name in enumerate("xyz")}
 
-    def view(self, *, linear_steps: int = LINEAR_STEPS, binary_steps: int = BINARY_STEPS) -> Any:
-        """The ``LdtView`` for kernels."""
+    def view(
+        self, search: str = DEFAULT_SEARCH, *, linear_steps: int = LINEAR_STEPS, binary_steps: int = BINARY_STEPS
+    ) -> Any:
+        """What kernels read for a search: a ``GridView`` for ``"exact"``, an ``LdtView`` for ``"linear"``.
+
+        Raises:
+            InputError: an unknown search.
+        """
+        if search not in TRACERS:
+            raise unknown_name("search", search, TRACERS)
+        if search == "exact":
+            return self.grid.view
         view = LdtView()
-        view.start, view.depth, view.reference = self.start, self.depth, self.reference
+        view.start, view.depth, view.reference = self._maps
         view.size = wp.vec3i(*self.frame.size)
         view.first_texel = wp.vec3i(*self.frame.first_texels[:3])
         view.texels_per_unit = self.frame.scale
@@ -103,7 +150,7 @@ class LayeredDepthTexture:
         origins: Any,
         directions: Any,
         *,
-        search: str = "linear",
+        search: str = DEFAULT_SEARCH,
         linear_steps: int = LINEAR_STEPS,
         binary_steps: int = BINARY_STEPS,
     ) -> Hits:
@@ -112,19 +159,16 @@ class LayeredDepthTexture:
         Args:
             origins: (n, 3) float32 numpy or Warp array.
             directions: (n, 3) float32, any length; ``t`` is in lengths of it.
-            search: how the maps are searched: ``"linear"``.
+            search: ``"exact"``, a walk through the occupied cells, or ``"linear"``, the paper's.
             linear_steps, binary_steps: of the linear search.
 
         Raises:
             InputError: shapes that do not fit, or an unknown search.
         """
-        if search not in TRACERS:
-            raise unknown_name("search", search, TRACERS)
-        device = self.start.device
-        views = wp.array(
-            [self.view(linear_steps=linear_steps, binary_steps=binary_steps)], dtype=LdtView, device=device
-        )
-        return trace_batch(TRACERS[search], views, self.geometry, origins, directions)
+        view = self.view(search, linear_steps=linear_steps, binary_steps=binary_steps)
+        tracer = TRACERS[search]
+        views = wp.array([view], dtype=tracer.view, device=self.geometry.vertices.device)
+        return trace_batch(tracer, views, self.geometry, origins, directions)
 
     def save(self, path: str | Path) -> None:
         """Write the maps and their mesh to one file, whole or not at all.
@@ -179,13 +223,13 @@ class LayeredDepthTexture:
         except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
             raise InputError(f"{path}: not a layered depth texture that can be read ({error})") from error
         _check(frame, start, depth, reference, len(mesh.faces), path)
-        return cls(
-            DeviceMesh.upload(mesh, target),
-            frame,
+        loaded = cls(DeviceMesh.upload(mesh, target), frame)
+        loaded._maps = (
             wp.array(start, dtype=wp.int32, device=target),
             wp.array(depth, dtype=wp.float32, device=target),
             wp.array(reference, dtype=wp.int32, device=target),
         )
+        return loaded
 
 
 def _check(frame: TexelFrame, start: Any, depth: Any, reference: Any, triangles: int, path: Any) -> None:
@@ -201,3 +245,48 @@ def _check(frame: TexelFrame, start: Any, depth: Any, reference: Any, triangles:
     )
     if not sound:
         raise InputError(f"{path}: the maps are damaged")
+
+
+def peel(
+    vertices: Any,
+    faces: Any,
+    resolution: int = DEFAULT_RESOLUTION,
+    device: str | None = None,
+    *,
+    quality: Quality = DEFAULT_QUALITY,
+    search: str = DEFAULT_SEARCH,
+) -> LayeredDepthTexture:
+    """Peel a triangle mesh into a layered depth texture.
+
+    Args:
+        vertices: (n, 3) numbers, object space.
+        faces: (m, 3) vertex numbers.
+        resolution: texels along the longest side of the bounding box, 1 to 4096.
+        device: 'cpu' (default) or a CUDA device.
+        quality: of the exact search: ``"exact"`` tests every triangle; ``"balanced"`` does so unless they are much
+            finer than texels; ``"fast"`` tests texels.
+        search: what the maps are made ready for now; another search makes what it needs when it is first used.
+
+    Raises:
+        InputError: an empty mesh, an index out of range, a vertex that is not finite, a value not allowed.
+    """
+    geometry = DeviceMesh.upload(Mesh(vertices, faces), launch.resolve_device(device))
+    return peel_mesh(geometry, resolution, quality=quality, search=search)
+
+
+def peel_mesh(
+    geometry: DeviceMesh,
+    resolution: int = DEFAULT_RESOLUTION,
+    *,
+    quality: Quality = DEFAULT_QUALITY,
+    search: str = DEFAULT_SEARCH,
+) -> LayeredDepthTexture:
+    """:func:`peel` for a mesh that is on a device already."""
+    for name, adapter, value in (("resolution", _RESOLUTION, resolution), ("quality", _QUALITY, quality)):
+        try:
+            adapter.validate_python(value)
+        except ValidationError as error:
+            raise first_fault(error, {}).within(name) from None
+    maps = LayeredDepthTexture(geometry, texel_frame(geometry.mesh, resolution), quality)
+    maps.view(search)
+    return maps

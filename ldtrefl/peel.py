@@ -1,10 +1,10 @@
-"""Mesh -> layered depth texture, in one pass over the geometry.
+"""Mesh -> fragments of a layered depth texture, in one pass over the geometry.
 
 Depth peeling (Zhang, Hsieh and Shen, section 3.4) draws the object once per layer. An A-buffer gives the same
 fragments in one pass: every triangle is rasterised exactly along the three axes (``raster.py``), all its fragments are
 kept, put into their texels and sorted by depth. Any number of layers; memory follows the fragments.
 
-    count a triangle's fragments -> prefix sum -> fill -> count a texel's fragments -> prefix sum -> place -> sort
+    snap vertices -> count a triangle's fragments -> prefix sum -> fill -> into texels -> sort each texel
 
 Every step writes places of its own, and fragments are sorted by (depth, triangle), so the bits are the same for any
 number of threads.
@@ -12,56 +12,56 @@ number of threads.
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import warp as wp
-from pydantic import Field, TypeAdapter, ValidationError
 
 from ldtrefl import launch
-from ldtrefl.cubemap import TexelFrame, texel_from_point
+from ldtrefl.binning import bin_items, exclusive_scan
+from ldtrefl.cubemap import TexelFrame
 from ldtrefl.device_scene import DeviceMesh
-from ldtrefl.errors import InputError, first_fault
-from ldtrefl.ldt import LayeredDepthTexture
-from ldtrefl.mesh import Mesh
-from ldtrefl.raster import FixedTriangle, cover, fixed_triangle, interpolate
+from ldtrefl.errors import InputError
+from ldtrefl.raster import FixedTriangle, cover, fixed_triangle, interpolate, snap
 
-Resolution = Annotated[int, Field(strict=True, ge=1, le=4096)]
-"""Texels along an object's longest side."""
-
-DEFAULT_RESOLUTION = 256
 INSERTION_LIMIT = wp.constant(24)
 """Fragments in a texel up to which insertion sort beats heap sort."""
 
 
 @wp.struct
 class PeelTarget:
-    """The mesh and the box of texels that it is peeled into."""
+    """The mesh in the box of texels that it is peeled into."""
 
-    vertices: wp.array(dtype=wp.vec3)
+    fixed: wp.array(dtype=wp.vec3i)  # vertices in fixed-point texels
+    texel: wp.array(dtype=wp.vec3)  # vertices in texels
     faces: wp.array(dtype=wp.vec3i)
-    scale: float  # texel = scale * unit + offset
-    offset: wp.vec3
     size: wp.vec3i
     first_texel: wp.vec3i
 
 
-@wp.func
-def corner_texel(target: PeelTarget, vertex: int, axis: int) -> wp.vec3:
-    """(u, v, depth) of a vertex in the map of ``axis``."""
-    return texel_from_point(axis, target.scale * target.vertices[vertex] + target.offset)
+@launch.kernel
+def snap_vertices(
+    first: int,
+    # In:
+    vertices: wp.array(dtype=wp.vec3),
+    scale: float,
+    offset: wp.vec3,
+    # Out:
+    texel_out: wp.array(dtype=wp.vec3),
+    fixed_out: wp.array(dtype=wp.vec3i),
+):
+    i = first + wp.tid()
+    p = scale * vertices[i] + offset
+    texel_out[i] = p
+    fixed_out[i] = wp.vec3i(int(snap(p[0])), int(snap(p[1])), int(snap(p[2])))
 
 
 @wp.func
-def projected(target: PeelTarget, corners: wp.vec3i, axis: int) -> FixedTriangle:
+def projected(target: PeelTarget, a: wp.vec3i, b: wp.vec3i, c: wp.vec3i, axis: int) -> FixedTriangle:
     """A triangle in the map of ``axis``."""
-    a, b, c = (
-        corner_texel(target, corners[0], axis),
-        corner_texel(target, corners[1], axis),
-        corner_texel(target, corners[2], axis),
-    )
-    columns, rows = target.size[(axis + 1) % 3], target.size[(axis + 2) % 3]
-    return fixed_triangle(wp.vec2(a[0], a[1]), wp.vec2(b[0], b[1]), wp.vec2(c[0], c[1]), columns, rows)
+    u, v = (axis + 1) % 3, (axis + 2) % 3
+    return fixed_triangle(a[u], a[v], b[u], b[v], c[u], c[v], target.size[u], target.size[v])
 
 
 @launch.kernel
@@ -73,9 +73,11 @@ def count_fragments(
     counts_out: wp.array(dtype=wp.int32),
 ):
     triangle = first + wp.tid()
+    corners = target.faces[triangle]
+    a, b, c = target.fixed[corners[0]], target.fixed[corners[1]], target.fixed[corners[2]]
     count = int(0)
     for axis in range(3):
-        tri = projected(target, target.faces[triangle], axis)
+        tri = projected(target, a, b, c, axis)
         if tri.area != wp.int64(0):
             for v in range(tri.first_v, tri.last_v + 1):
                 for u in range(tri.first_u, tri.last_u + 1):
@@ -96,71 +98,43 @@ def fill_fragments(
     reference_out: wp.array(dtype=wp.int32),
 ):
     triangle = first + wp.tid()
-    place = places[triangle]
+    place = int(places[triangle])
     if place == places[triangle + 1]:
         return
     corners = target.faces[triangle]
+    a, b, c = target.fixed[corners[0]], target.fixed[corners[1]], target.fixed[corners[2]]
     for axis in range(3):
-        tri = projected(target, corners, axis)
+        tri = projected(target, a, b, c, axis)
         if tri.area != wp.int64(0):
-            a, b, c = (
-                corner_texel(target, corners[0], axis),
-                corner_texel(target, corners[1], axis),
-                corner_texel(target, corners[2], axis),
-            )
+            depth_a = target.texel[corners[0]][axis]
+            depth_b = target.texel[corners[1]][axis]
+            depth_c = target.texel[corners[2]][axis]
             columns = target.size[(axis + 1) % 3]
             for v in range(tri.first_v, tri.last_v + 1):
                 for u in range(tri.first_u, tri.last_u + 1):
                     at = cover(tri, u, v)
                     if at.covered:
                         texel_out[place] = target.first_texel[axis] + v * columns + u
-                        depth_out[place] = interpolate(tri, at, a[2], b[2], c[2])
+                        depth_out[place] = interpolate(tri, at, depth_a, depth_b, depth_c)
                         # Counter-clockwise in (u, v) is a normal up the axis.
                         reference_out[place] = 2 * triangle + 1 - tri.flipped
                         place += 1
 
 
-@wp.func
-def texel_is_in_part(texel: int, texels: int, part: int, parts: int) -> bool:
-    """Whether a texel belongs to one of ``parts`` equal runs of the texels."""
-    return int(wp.int64(texel) * wp.int64(parts) / wp.int64(texels)) == part
-
-
 @launch.kernel
-def count_texels(
-    part: int,
-    parts: int,
+def scatter_fragments(
+    first: int,
     # In:
-    texel: wp.array(dtype=wp.int32),
-    texels: int,
-    # Out:
-    counts_out: wp.array(dtype=wp.int32),
-):
-    i = wp.tid()
-    if texel_is_in_part(texel[i], texels, part, parts):
-        wp.atomic_add(counts_out, texel[i], 1)
-
-
-@launch.kernel
-def place_fragments(
-    part: int,
-    parts: int,
-    # In:
-    texel: wp.array(dtype=wp.int32),
+    places: wp.array(dtype=wp.int32),
     depth: wp.array(dtype=wp.float32),
     reference: wp.array(dtype=wp.int32),
-    texels: int,
-    start: wp.array(dtype=wp.int32),
     # Out:
-    filled_out: wp.array(dtype=wp.int32),
     depth_out: wp.array(dtype=wp.float32),
     reference_out: wp.array(dtype=wp.int32),
 ):
-    i = wp.tid()
-    if texel_is_in_part(texel[i], texels, part, parts):
-        place = start[texel[i]] + wp.atomic_add(filled_out, texel[i], 1)
-        depth_out[place] = depth[i]
-        reference_out[place] = reference[i]
+    i = first + wp.tid()
+    depth_out[places[i]] = depth[i]
+    reference_out[places[i]] = reference[i]
 
 
 @wp.func
@@ -245,74 +219,53 @@ def sort_texels(
         insertion_sort(depth, reference, begin, end)
 
 
-def peel(
-    vertices: Any, faces: Any, resolution: int = DEFAULT_RESOLUTION, device: str | None = None
-) -> LayeredDepthTexture:
-    """Peel a triangle mesh into a layered depth texture.
+@dataclass(frozen=True, eq=False)
+class Fragments:
+    """Fragments of the three maps, as arrays of equal length."""
 
-    Args:
-        vertices: (n, 3) numbers, object space.
-        faces: (m, 3) vertex numbers.
-        resolution: texels along the longest side of the bounding box, 1 to 4096.
-        device: 'cpu' (default) or a CUDA device.
-
-    Raises:
-        InputError: an empty mesh, an index out of range, a vertex that is not finite, a resolution not allowed.
-    """
-    return peel_mesh(DeviceMesh.upload(Mesh(vertices, faces), launch.resolve_device(device)), resolution)
+    texel: wp.array
+    """int32 number of the texel, the three axes' maps in a row."""
+    depth: wp.array
+    """float32, texels along the map's axis."""
+    reference: wp.array
+    """int32: triangle times 2, plus 1 if it faces up the axis."""
 
 
-def peel_mesh(geometry: DeviceMesh, resolution: int = DEFAULT_RESOLUTION) -> LayeredDepthTexture:
-    """:func:`peel` for a mesh that is on a device already."""
-    try:
-        TypeAdapter(Resolution).validate_python(resolution)
-    except ValidationError as error:
-        raise first_fault(error, {}).within("resolution") from None
-    device = geometry.vertices.device
-    low, high = _unit_bounds(geometry.mesh)
-    frame = TexelFrame.around(low, high, resolution)
-    raw = _rasterise(geometry, frame, device)
-    return LayeredDepthTexture(geometry, frame, *_sorted(frame, *raw, device))
+class Rasteriser:
+    """A mesh in its box of texels: counts its fragments, then makes them."""
+
+    def __init__(self, geometry: DeviceMesh, frame: TexelFrame) -> None:
+        self._frame, self._device = frame, geometry.vertices.device
+        self._triangles = len(geometry.faces)
+        vertices = len(geometry.vertices)
+        self._target = PeelTarget()
+        self._target.texel = wp.empty(vertices, dtype=wp.vec3, device=self._device)
+        self._target.fixed = wp.empty(vertices, dtype=wp.vec3i, device=self._device)
+        self._target.faces = geometry.faces
+        self._target.size, self._target.first_texel = wp.vec3i(*frame.size), wp.vec3i(*frame.first_texels[:3])
+        inputs: list[Any] = [geometry.vertices, frame.scale, wp.vec3(*frame.offset)]
+        launch.launch(snap_vertices, vertices, [*inputs, self._target.texel, self._target.fixed], self._device)
+        counts = wp.zeros(self._triangles + 1, dtype=wp.int32, device=self._device)
+        launch.launch(count_fragments, self._triangles, [self._target, counts], self._device)
+        total = int(counts.numpy().sum(dtype=np.int64))
+        if total > np.iinfo(np.int32).max:
+            raise InputError(f"{total} fragments at resolution {max(frame.size)}; a lower resolution is needed")
+        self._places, self.count = exclusive_scan(counts)
+
+    def fragments(self) -> Fragments:
+        """All fragments, by triangle."""
+        texel, reference = (wp.empty(self.count, dtype=wp.int32, device=self._device) for _ in range(2))
+        depth = wp.empty(self.count, dtype=wp.float32, device=self._device)
+        inputs = [self._target, self._places, texel, depth, reference]
+        launch.launch(fill_fragments, self._triangles, inputs, self._device)
+        return Fragments(texel, depth, reference)
 
 
-def _unit_bounds(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
-    centre, half = mesh.unit_frame
-    low, high = mesh.bounds
-    return (low - centre) / half, (high - centre) / half
-
-
-def _rasterise(geometry: DeviceMesh, frame: TexelFrame, device: wp.Device) -> tuple[wp.array, wp.array, wp.array]:
-    """(texel, depth, reference) of every fragment, by triangle."""
-    triangles = geometry.faces.shape[0]
-    target = PeelTarget()
-    target.vertices, target.faces = geometry.vertices, geometry.faces
-    target.scale, target.offset = frame.scale, wp.vec3(*frame.offset)
-    target.size, target.first_texel = wp.vec3i(*frame.size), wp.vec3i(*frame.first_texels[:3])
-    counts = wp.zeros(triangles + 1, dtype=wp.int32, device=device)
-    launch.launch(count_fragments, triangles, [target, counts], device)
-    total = int(counts.numpy().sum(dtype=np.int64))
-    if total > np.iinfo(np.int32).max:
-        raise InputError(f"{total} fragments at resolution {max(frame.size)}; a lower resolution is needed")
-    places = wp.empty(triangles + 1, dtype=wp.int32, device=device)
-    wp.utils.array_scan(counts, places, inclusive=False)
-    texel, reference = (wp.empty(total, dtype=wp.int32, device=device) for _ in range(2))
-    depth = wp.empty(total, dtype=wp.float32, device=device)
-    launch.launch(fill_fragments, triangles, [target, places, texel, depth, reference], device)
-    return texel, depth, reference
-
-
-def _sorted(
-    frame: TexelFrame, texel: wp.array, depth: wp.array, reference: wp.array, device: wp.Device
-) -> tuple[wp.array, wp.array, wp.array]:
-    """(start, depth, reference) with the fragments in their texels."""
-    texels, total = frame.first_texels[3], texel.shape[0]
-    counts = wp.zeros(texels + 1, dtype=wp.int32, device=device)
-    launch.launch_parts(count_texels, total, [texel, texels, counts], device)
-    start = wp.empty(texels + 1, dtype=wp.int32, device=device)
-    wp.utils.array_scan(counts, start, inclusive=False)
-    counts.zero_()
-    depth_out, reference_out = wp.empty_like(depth), wp.empty_like(reference)
-    inputs = [texel, depth, reference, texels, start, counts, depth_out, reference_out]
-    launch.launch_parts(place_fragments, total, inputs, device)
-    launch.launch(sort_texels, texels, [start, depth_out, reference_out], device)
-    return start, depth_out, reference_out
+def sort_fragments(frame: TexelFrame, raw: Fragments) -> tuple[wp.array, wp.array, wp.array]:
+    """(start, depth, reference) with the fragments in their texels, each texel sorted."""
+    texels, total, device = frame.first_texels[3], raw.texel.shape[0], raw.texel.device
+    start, places = bin_items(raw.texel, texels, device)
+    depth, reference = wp.empty_like(raw.depth), wp.empty_like(raw.reference)
+    launch.launch(scatter_fragments, total, [places, raw.depth, raw.reference, depth, reference], device)
+    launch.launch(sort_texels, texels, [start, depth, reference], device)
+    return start, depth, reference

@@ -14,10 +14,11 @@ from __future__ import annotations
 
 import warp as wp
 
-SUBTEXEL_BITS = 16
-"""Fixed-point digits of a texel: finer than float32 at 256, and an edge function of 4096 texels fits in int64."""
+SUBTEXEL_BITS = wp.constant(16)
+"""Fixed-point digits of a texel: finer than float32 at 256; 4096 texels fit in int32, their edge functions in int64."""
 SUBTEXELS = wp.constant(wp.float64(1 << SUBTEXEL_BITS))
 TEXEL = wp.constant(wp.int64(1 << SUBTEXEL_BITS))
+HALF_TEXEL_32 = wp.constant(1 << (SUBTEXEL_BITS - 1))
 HALF_TEXEL = wp.constant(wp.int64(1 << (SUBTEXEL_BITS - 1)))
 
 ROUNDING = wp.constant(wp.float64(1.0e-13))
@@ -49,31 +50,31 @@ def snap(x: wp.float32) -> wp.int64:
 
 
 @wp.func
-def first_centre(x: wp.int64) -> int:
+def first_centre(x: int) -> int:
     """The first texel whose centre is not below x."""
-    return int((x + HALF_TEXEL - wp.int64(1)) >> wp.int64(SUBTEXEL_BITS))
+    return (x + HALF_TEXEL_32 - 1) >> SUBTEXEL_BITS
 
 
 @wp.func
-def last_centre(x: wp.int64) -> int:
+def last_centre(x: int) -> int:
     """The last texel whose centre is not above x."""
-    return int((x - HALF_TEXEL) >> wp.int64(SUBTEXEL_BITS))
+    return (x - HALF_TEXEL_32) >> SUBTEXEL_BITS
 
 
 @wp.func
-def fixed_triangle(a: wp.vec2, b: wp.vec2, c: wp.vec2, columns: int, rows: int) -> FixedTriangle:
-    """Snap a projected triangle; ``area`` is 0 where it covers no texel centre for sure."""
+def fixed_triangle(au: int, av: int, bu: int, bv: int, cu: int, cv: int, columns: int, rows: int) -> FixedTriangle:
+    """A projected triangle from snapped corners; ``area`` is 0 where it covers no texel centre for sure."""
     tri = FixedTriangle()
-    ax, ay = snap(a[0]), snap(a[1])
-    bx, by = snap(b[0]), snap(b[1])
-    cx, cy = snap(c[0]), snap(c[1])
-    tri.first_u = wp.max(first_centre(wp.min(ax, wp.min(bx, cx))), 0)
-    tri.last_u = wp.min(last_centre(wp.max(ax, wp.max(bx, cx))), columns - 1)
-    tri.first_v = wp.max(first_centre(wp.min(ay, wp.min(by, cy))), 0)
-    tri.last_v = wp.min(last_centre(wp.max(ay, wp.max(by, cy))), rows - 1)
+    tri.first_u = wp.max(first_centre(wp.min(au, wp.min(bu, cu))), 0)
+    tri.last_u = wp.min(last_centre(wp.max(au, wp.max(bu, cu))), columns - 1)
+    tri.first_v = wp.max(first_centre(wp.min(av, wp.min(bv, cv))), 0)
+    tri.last_v = wp.min(last_centre(wp.max(av, wp.max(bv, cv))), rows - 1)
     # Most triangles of a dense mesh lie between texel centres and end here.
     if tri.first_u > tri.last_u or tri.first_v > tri.last_v:
         return tri
+    ax, ay = wp.int64(au), wp.int64(av)
+    bx, by = wp.int64(bu), wp.int64(bv)
+    cx, cy = wp.int64(cu), wp.int64(cv)
     area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
     flip = area < wp.int64(0)
     tri.ax = ax

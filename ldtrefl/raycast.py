@@ -32,6 +32,7 @@ def closest_hit_bvh(
     if found.result:
         hit.t = found.t
         hit.triangle = found.face
+        hit.normal = wp.normalize(found.normal)
         # Warp's u and v weigh the first and second corner, ours the second and third.
         hit.u = found.v
         hit.v = 1.0 - found.u - found.v

@@ -18,6 +18,10 @@ from ldtrefl import launch
 from ldtrefl.device_scene import DeviceMesh
 from ldtrefl.errors import InputError
 
+SHORTEST = wp.constant(1.0e-15)
+LONGEST = wp.constant(1.0e15)
+"""Lengths of directions whose squares stay well inside float32's range."""
+
 
 @wp.struct
 class Hit:
@@ -27,6 +31,7 @@ class Hit:
     triangle: int
     u: float  # barycentrics: weights of the triangle's second and third corner
     v: float
+    normal: wp.vec3  # of the facet, unit, by the triangle's winding
     steps: int  # texels or samples looked at
 
 
@@ -81,10 +86,8 @@ def batch_kernel(tracer: Tracer) -> wp.Kernel:
         first: int,
         # In:
         views: wp.array(dtype=tracer.view),
-        vertices: wp.array(dtype=wp.vec3),
-        faces: wp.array(dtype=wp.vec3i),
         centre: wp.vec3d,
-        half: wp.float64,
+        per_half: wp.float64,
         origins: wp.array(dtype=wp.vec3),
         directions: wp.array(dtype=wp.vec3),
         # Out:
@@ -95,27 +98,26 @@ def batch_kernel(tracer: Tracer) -> wp.Kernel:
         invalid_out: wp.array(dtype=wp.uint8),
     ):
         i = first + wp.tid()
-        origin = wp.vec3d(wp.float64(origins[i][0]), wp.float64(origins[i][1]), wp.float64(origins[i][2]))
-        direction = wp.vec3d(wp.float64(directions[i][0]), wp.float64(directions[i][1]), wp.float64(directions[i][2]))
+        origin = origins[i]
+        direction = directions[i]
         length = wp.length(direction)
+        if length < SHORTEST or length > LONGEST:
+            # Its square may have left float32's range.
+            largest = wp.max(wp.abs(direction[0]), wp.max(wp.abs(direction[1]), wp.abs(direction[2])))
+            length = largest * wp.length(direction / largest)
         hit = no_hit()
         normal = wp.vec3(0.0)
-        if wp.isfinite(origin) and wp.isfinite(length) and length > wp.float64(0.0):
+        if wp.isfinite(origin) and wp.isfinite(length) and length > 0.0:
             # Shift and scale in float64: the object may be tiny and far from its origin.
-            origin = (origin - centre) / half
-            direction = direction / length
-            hit = closest_hit(
-                views,
-                0,
-                wp.vec3(float(origin[0]), float(origin[1]), float(origin[2])),
-                wp.vec3(float(direction[0]), float(direction[1]), float(direction[2])),
-                float(wp.inf),
+            start = wp.vec3(
+                float((wp.float64(origin[0]) - centre[0]) * per_half),
+                float((wp.float64(origin[1]) - centre[1]) * per_half),
+                float((wp.float64(origin[2]) - centre[2]) * per_half),
             )
+            hit = closest_hit(views, 0, start, direction / length, float(wp.inf))
             if hit.triangle >= 0:
-                hit.t = float(wp.float64(hit.t) * half / length)
-                corners = faces[hit.triangle]
-                a, b, c = vertices[corners[0]], vertices[corners[1]], vertices[corners[2]]
-                normal = wp.normalize(wp.cross(b - a, c - a))
+                hit.t = float(wp.float64(hit.t) / (per_half * wp.float64(length)))
+                normal = hit.normal
         else:
             invalid_out[i] = wp.uint8(1)
         t_out[i] = hit.t
@@ -146,7 +148,7 @@ def trace_batch(tracer: Tracer, views: wp.array, geometry: DeviceMesh, origins: 
     t, triangle = wp.empty(n, dtype=float, device=device), wp.empty(n, dtype=int, device=device)
     normal, barycentrics = wp.empty(n, dtype=wp.vec3, device=device), wp.empty(n, dtype=wp.vec2, device=device)
     invalid = wp.zeros(n, dtype=wp.uint8, device=device)
-    inputs = [views, geometry.vertices, geometry.faces, wp.vec3d(*centre), wp.float64(half), starts, ways]
+    inputs = [views, wp.vec3d(*centre), wp.float64(1.0 / half), starts, ways]
     launch.launch(batch_kernel(tracer), n, [*inputs, t, normal, triangle, barycentrics, invalid], device)
     as_asked = (lambda array: array) if as_warp else (lambda array: array.numpy())
     bad = int(invalid.numpy().sum())

@@ -6,7 +6,11 @@ regions on the reflectors are culled (section 3.2); the remaining pixels' rays a
 
     ldtrefl render scene.toml --method ldt --set resolution=256
 
-Fails: the linear search misses what is thinner than a step or a texel, and silhouettes are as coarse as texels.
+The default search is our own (``grid.py``): it walks the occupied cells and tests the triangles in them, or the texels
+where many triangles share one. ``search=linear`` is the paper's.
+
+Fails: ``search=linear`` misses what is thinner than a step or a texel, and its silhouettes are as coarse as texels;
+``quality=fast`` loses a little at silhouettes.
 """
 
 from __future__ import annotations
@@ -18,13 +22,19 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from ldtrefl.cull import CullTest, find_regions
-from ldtrefl.fragments import LdtView
 from ldtrefl.gbuffer import GBuffer
+from ldtrefl.grid import Quality
 from ldtrefl.launch import Stats
-from ldtrefl.ldt import BINARY_STEPS, LINEAR_STEPS, LayeredDepthTexture
+from ldtrefl.ldt import (
+    BINARY_STEPS,
+    DEFAULT_QUALITY,
+    DEFAULT_RESOLUTION,
+    LINEAR_STEPS,
+    LayeredDepthTexture,
+    peel_mesh,
+)
 from ldtrefl.march import TRACERS
 from ldtrefl.methods.base import CONFIG, Method, Reflection
-from ldtrefl.peel import DEFAULT_RESOLUTION, peel_mesh
 from ldtrefl.reflect import BoundTracer, follow_rays
 
 
@@ -39,8 +49,10 @@ class Ldt(Method):
 
         resolution: Annotated[int, Field(strict=True, ge=16, le=4096)] = DEFAULT_RESOLUTION
         """Texels along an object's longest side, 16 to 4096."""
-        search: Literal["linear"] = "linear"
-        """How a ray is searched for in the maps: linear (the paper's)."""
+        search: Literal["exact", "linear"] = "exact"
+        """How a ray is searched for: exact (a walk through occupied cells), linear (the paper's)."""
+        quality: Quality = DEFAULT_QUALITY
+        """Of the exact search: exact (every triangle), balanced (texels where triangles are finer), fast (texels)."""
         linear_steps: Annotated[int, Field(strict=True, ge=1, le=100_000)] = LINEAR_STEPS
         """Steps of the linear search through an object's box."""
         binary_steps: Annotated[int, Field(strict=True, ge=0, le=64)] = BINARY_STEPS
@@ -53,20 +65,22 @@ class Ldt(Method):
     def _bind(self, needed: set[int], stats: Stats) -> BoundTracer:
         """The tracer, once the maps of the objects in ``needed`` are peeled."""
         maps: dict[int, LayeredDepthTexture] = self.__dict__.setdefault("_maps", {})
+        quality, search = self.config.quality, self.config.search
         with stats.stage("peel", self.scene.device):
             for index in sorted(needed):
                 geometry = self.scene.objects[index].geometry
                 if id(geometry) not in maps:
-                    maps[id(geometry)] = peel_mesh(geometry, self.config.resolution)
+                    maps[id(geometry)] = peel_mesh(geometry, self.config.resolution, quality=quality, search=search)
                     stats.count("objects_peeled", 1)
                     stats.count("fragments", maps[id(geometry)].fragment_count)
                     stats.count("map_bytes", maps[id(geometry)].nbytes)
+        tracer = TRACERS[search]
         steps = {"linear_steps": self.config.linear_steps, "binary_steps": self.config.binary_steps}
         views = [
-            maps[id(entry.geometry)].view(**steps) if id(entry.geometry) in maps else LdtView()
+            maps[id(entry.geometry)].view(search, **steps) if id(entry.geometry) in maps else tracer.view()
             for entry in self.scene.objects
         ]
-        return BoundTracer(TRACERS[self.config.search], wp.array(views, dtype=LdtView, device=self.scene.device))
+        return BoundTracer(tracer, wp.array(views, dtype=tracer.view, device=self.scene.device))
 
     def shadow_tracer(self, stats: Stats) -> BoundTracer:
         """All objects' maps."""
