@@ -51,6 +51,20 @@ def place_items(
         places_out[i] = start[number] + wp.atomic_add(filled_out, number, 1)
 
 
+@launch.kernel
+def list_marked(
+    first: int,
+    # In:
+    marked: wp.array(dtype=wp.int32),
+    places: wp.array(dtype=wp.int32),
+    # Out:
+    list_out: wp.array(dtype=wp.int32),
+):
+    i = first + wp.tid()
+    if marked[i] != 0:
+        list_out[places[i]] = i
+
+
 def exclusive_scan(counts: wp.array) -> tuple[wp.array, int]:
     """(prefix sums, their last): ``counts`` ends with a 0 that the total takes the place of."""
     sums = wp.empty_like(counts)
@@ -73,3 +87,11 @@ def bin_items(numbers: wp.array, bins: int, device: wp.Device) -> tuple[wp.array
     places = wp.empty(items, dtype=wp.int32, device=device)
     launch.launch_parts(place_items, items, [numbers, bins, start, counts, places], device)
     return start, places
+
+
+def list_items(marked: wp.array) -> wp.array:
+    """Numbers of the items marked with 1, in order; ``marked`` has one entry more than there are items, a 0."""
+    places, count = exclusive_scan(marked)
+    listed = wp.empty(count, dtype=wp.int32, device=marked.device)
+    launch.launch(list_marked, marked.shape[0] - 1, [marked, places, listed], marked.device)
+    return listed

@@ -13,6 +13,7 @@ import numpy as np
 import warp as wp
 
 from ldtrefl import launch
+from ldtrefl.binning import list_items
 from ldtrefl.camera import CameraView, camera_view, pixels_from_world
 from ldtrefl.device_scene import DeviceScene, ObjectRecord
 from ldtrefl.raster import homogeneous_triangle, inverse_depth, perspective_weights
@@ -102,28 +103,60 @@ def pixel_box(a: wp.vec3d, b: wp.vec3d, c: wp.vec3d, width: int, height: int) ->
     return box
 
 
+@wp.struct
+class ProjectedMesh:
+    """An object's triangles in homogeneous pixel coordinates, and the image."""
+
+    faces: wp.array(dtype=wp.vec3i)
+    corners: wp.array(dtype=wp.vec3d)  # of all objects' vertices
+    first_vertex: int
+    first_triangle: int
+    width: int
+    height: int
+
+
+@launch.kernel
+def find_visible(
+    first: int,
+    # In:
+    mesh: ProjectedMesh,
+    # Out: 1 where the triangle may cover a pixel's centre, and the pixels it may cover
+    visible_out: wp.array(dtype=wp.int32),
+    box_out: wp.array(dtype=PixelBox),
+):
+    triangle = first + wp.tid()
+    face = mesh.faces[triangle]
+    box = pixel_box(
+        mesh.corners[mesh.first_vertex + face[0]],
+        mesh.corners[mesh.first_vertex + face[1]],
+        mesh.corners[mesh.first_vertex + face[2]],
+        mesh.width,
+        mesh.height,
+    )
+    if box.first_x <= box.last_x and box.first_y <= box.last_y:
+        visible_out[triangle] = 1
+        box_out[triangle] = box
+
+
 @launch.kernel
 def draw_triangles(
     part: int,
     parts: int,
     # In:
-    faces: wp.array(dtype=wp.vec3i),
-    corners: wp.array(dtype=wp.vec3d),
-    first_vertex: int,
-    first_triangle: int,
-    width: int,
-    height: int,
+    mesh: ProjectedMesh,
+    visible: wp.array(dtype=wp.int32),
+    boxes: wp.array(dtype=PixelBox),
     # Out: a pixel's key holds 1 / depth in its upper half, the triangle in its lower
     key_out: wp.array(dtype=wp.int64),
 ):
-    triangle = wp.tid()
-    face = faces[triangle]
-    a = corners[first_vertex + face[0]]
-    b = corners[first_vertex + face[1]]
-    c = corners[first_vertex + face[2]]
-    box = pixel_box(a, b, c, width, height)
-    if box.first_x > box.last_x or box.first_y > box.last_y:
+    triangle = visible[wp.tid()]
+    box = boxes[triangle]
+    if box.first_y / BAND == box.last_y / BAND and (box.first_y / BAND) % parts != part:
         return
+    face = mesh.faces[triangle]
+    a = mesh.corners[mesh.first_vertex + face[0]]
+    b = mesh.corners[mesh.first_vertex + face[1]]
+    c = mesh.corners[mesh.first_vertex + face[2]]
     tri = homogeneous_triangle(a, b, c)
     if tri.volume == wp.float64(0.0):
         return
@@ -135,10 +168,9 @@ def draw_triangles(
                 if at[0] >= zero and at[1] >= zero and at[2] >= zero:
                     nearness = inverse_depth(tri, at)
                     if nearness > 0.0:
-                        key = (wp.int64(wp.cast(nearness, wp.int32)) << wp.int64(32)) | wp.int64(
-                            first_triangle + triangle
-                        )
-                        wp.atomic_max(key_out, y * width + x, key)
+                        number = wp.int64(mesh.first_triangle + triangle)
+                        key = (wp.int64(wp.cast(nearness, wp.int32)) << wp.int64(32)) | number
+                        wp.atomic_max(key_out, y * mesh.width + x, key)
 
 
 @wp.func
@@ -284,8 +316,17 @@ def draw_gbuffer(scene: DeviceScene, camera: Camera, *, without: int = -1) -> GB
             continue
         mesh, rows = entry.geometry, [wp.vec4d(*row) for row in from_world @ entry.world_from_unit]
         launch.launch(project_vertices, len(mesh.vertices), [mesh.vertices, *rows, first_vertex, corners], device)
-        inputs = [mesh.faces, corners, first_vertex, entry.record.first_triangle, width, height, keys]
-        launch.launch_parts(draw_triangles, len(mesh.faces), inputs, device)
+        # Most triangles of a dense mesh lie between pixel centres: find the others once, for all threads.
+        triangles = len(mesh.faces)
+        projected = ProjectedMesh()
+        projected.faces, projected.corners = mesh.faces, corners
+        projected.first_vertex, projected.first_triangle = first_vertex, entry.record.first_triangle
+        projected.width, projected.height = width, height
+        marked = wp.zeros(triangles + 1, dtype=wp.int32, device=device)
+        boxes = wp.empty(triangles, dtype=PixelBox, device=device)
+        launch.launch(find_visible, triangles, [projected, marked, boxes], device)
+        visible = list_items(marked)
+        launch.launch_parts(draw_triangles, visible.shape[0], [projected, visible, boxes, keys], device)
     view = GBufferView()
     view.object, view.triangle = (wp.empty(pixels, dtype=wp.int32, device=device) for _ in range(2))
     view.barycentrics = wp.zeros(pixels, dtype=wp.vec2, device=device)

@@ -44,7 +44,7 @@ class _State:
     """What one process shares."""
 
     threads: int = os.cpu_count() or 1
-    pool: ThreadPoolExecutor | None = None
+    pools: dict[int, ThreadPoolExecutor] = field(default_factory=dict)
     observer: Callable[[str, float], None] | None = None
     stage: str = ""
 
@@ -69,9 +69,6 @@ def set_threads(threads: int | None = None) -> None:
         threads = os.cpu_count() or 1
     if not isinstance(threads, int) or isinstance(threads, bool) or not 1 <= threads <= 1024:
         raise InputError(f"threads must be a whole number from 1 to 1024, got {threads!r}")
-    if threads != _state.threads and _state.pool is not None:
-        _state.pool.shutdown()
-        _state.pool = None
     _state.threads = threads
 
 
@@ -165,9 +162,10 @@ def _run(kernel: wp.Kernel, device: wp.Device, slices: list[tuple[int, list[Any]
             wp.launch(kernel, dim=count, inputs=arguments, device=device)
             _report(done / len(slices))
         return
-    if _state.pool is None:
-        _state.pool = ThreadPoolExecutor(_state.threads, thread_name_prefix="ldtrefl")
-    futures = [_state.pool.submit(wp.launch, kernel, count, arguments, device=device) for count, arguments in slices]
+    if _state.threads not in _state.pools:
+        _state.pools[_state.threads] = ThreadPoolExecutor(_state.threads, thread_name_prefix="ldtrefl")
+    pool = _state.pools[_state.threads]
+    futures = [pool.submit(wp.launch, kernel, count, arguments, device=device) for count, arguments in slices]
     for done, future in enumerate(as_completed(futures), 1):
         future.result()
         _report(done / len(slices))

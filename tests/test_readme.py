@@ -1,5 +1,8 @@
-"""The README's commands are those that run here."""
+"""The README's commands are those that run here, and the tools write what they promise."""
 
+import json
+import subprocess
+import sys
 from pathlib import Path
 
 from ldtrefl import shapes
@@ -24,3 +27,17 @@ def test_readme_lists_every_shape_and_method() -> None:
 
     readme = (ROOT / "README.md").read_text()
     assert all(f"`{name}`" in readme for name in [*shapes.names(), *all_methods()])
+
+
+def test_benchmark_writes_what_it_promises(tmp_path: Path) -> None:
+    """The shape of the output, never the times."""
+    command = [sys.executable, str(ROOT / "tools" / "benchmark.py"), "--quick", "-o", str(tmp_path)]
+    done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    plots = {"error_against_time.png", "time_against_triangles.png", "build_against_triangles.png"}
+    assert {path.name for path in tmp_path.iterdir()} == plots | {"benchmark.json", "benchmark.md"}
+    result = json.loads((tmp_path / "benchmark.json").read_text())
+    assert {"machine", "meshes", "error_against_time", "stages", "scaling", "paper"} <= set(result)
+    for row in result["meshes"]:
+        assert row["errors"]["ldt exact"]["wrong_hits"] + row["errors"]["ldt exact"]["wrong_misses"] <= 0.01
+        assert {"median", "min", "max"} <= set(row["milliseconds"]["bvh"])

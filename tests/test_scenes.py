@@ -13,6 +13,9 @@ from ldtrefl import metrics
 from .conftest import SCENES
 
 SHIPPED = sorted(SCENES.glob("*.toml"))
+LINEAR_SSIM = 0.98
+"""What the paper's search reaches at 256 in every scene."""
+
 ALL = SHIPPED + sorted((SCENES / "paper").glob("*.toml"))
 
 
@@ -41,6 +44,22 @@ def test_scene_reaches_its_ssim(path: Path, method: str) -> None:
     truth = frame(path, "bvh")
     value = metrics.ssim(frame(path, method).image, truth.image, truth.reflector_mask)
     assert value >= expected, f"{method} on {name_of(path)}: SSIM {value:.4f}, {expected} expected"
+
+
+@pytest.mark.parametrize("path", ALL, ids=name_of)
+def test_the_papers_search_is_close(path: Path) -> None:
+    truth = frame(path, "bvh")
+    linear = ldtrefl.render(loaded(path), "ldt", search="linear")
+    value = metrics.ssim(linear.image, truth.image, truth.reflector_mask)
+    assert value >= LINEAR_SSIM, f"linear search on {name_of(path)}: SSIM {value:.4f}, {LINEAR_SSIM} expected"
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=name_of)
+def test_every_triangle_gives_the_ray_casters_picture(path: Path) -> None:
+    truth = frame(path, "bvh")
+    exact = ldtrefl.render(loaded(path), "ldt", quality="exact")
+    assert metrics.ssim(exact.image, truth.image, truth.reflector_mask) >= 0.9999
+    assert metrics.flip(exact.image, truth.image, truth.reflector_mask) <= 1e-4
 
 
 @pytest.mark.parametrize("path", ALL, ids=name_of)
