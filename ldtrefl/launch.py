@@ -10,12 +10,13 @@ from __future__ import annotations
 
 import functools
 import itertools
+import operator
 import os
 import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
@@ -156,19 +157,40 @@ def launch_parts(kernel: wp.Kernel, count: int, arguments: Sequence[Any], device
 
 
 def _run(kernel: wp.Kernel, device: wp.Device, slices: list[tuple[int, list[Any]]]) -> None:
-    kernel.module.load(device)  # once, before any thread: loading is not safe from several
-    if len(slices) == 1 or _state.threads == 1:
-        for done, (count, arguments) in enumerate(slices, 1):
-            wp.launch(kernel, dim=count, inputs=arguments, device=device)
-            _report(done / len(slices))
-        return
+    """Work off the slices, (items, arguments) each, that differ in their first argument alone."""
+    # Recording loads the kernel's module, which is not safe from several threads: once here, before any other starts.
+    count, arguments = slices[0]
+    command = wp.launch(kernel, dim=count, inputs=arguments, device=device, record_cmd=True)
+    waiting = iter(slices[1:])  # taken from by all threads, one slice at a time
+    workers = min(_state.threads, len(slices)) - 1
+    helpers = [_pool().submit(_work, kernel, device, waiting) for _ in range(workers)]
+    command.launch()
+    for count, arguments in waiting:
+        _report(1.0 - operator.length_hint(waiting) / len(slices))
+        command.set_dim(count)
+        command.set_param_at_index(0, arguments[0])
+        command.launch()
+    for helper in helpers:
+        helper.result()
+    _report(1.0)
+
+
+def _work(kernel: wp.Kernel, device: wp.Device, waiting: Iterator[tuple[int, list[Any]]]) -> None:
+    """Launch slices until none waits. The arguments are packed once, which takes ten times a launch."""
+    command = None
+    for count, arguments in waiting:
+        if command is None:
+            command = wp.launch(kernel, dim=count, inputs=arguments, device=device, record_cmd=True)
+        else:
+            command.set_dim(count)
+            command.set_param_at_index(0, arguments[0])
+        command.launch()
+
+
+def _pool() -> ThreadPoolExecutor:
     if _state.threads not in _state.pools:
         _state.pools[_state.threads] = ThreadPoolExecutor(_state.threads, thread_name_prefix="ldtrefl")
-    pool = _state.pools[_state.threads]
-    futures = [pool.submit(wp.launch, kernel, count, arguments, device=device) for count, arguments in slices]
-    for done, future in enumerate(as_completed(futures), 1):
-        future.result()
-        _report(done / len(slices))
+    return _state.pools[_state.threads]
 
 
 def _report(fraction: float) -> None:
