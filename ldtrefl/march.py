@@ -194,7 +194,7 @@ def barycentrics_at(a: wp.vec3, b: wp.vec3, c: wp.vec3, p: wp.vec3) -> wp.vec2:
     return wp.vec2(u / excess, v / excess)
 
 
-TEST_BLOCKS = """
+MEET_BLOCKS = """
     const int lanes = 8;
     float nearest[lanes];
     int where[lanes];
@@ -224,8 +224,8 @@ TEST_BLOCKS = """
 """.replace("NO_HIT", "3.0e38f")
 
 
-@wp.func_native(TEST_BLOCKS)
-def test_blocks(
+@wp.func_native(MEET_BLOCKS)
+def meet_blocks(
     rows: wp.array(dtype=wp.float32),
     first_block: int,
     end_block: int,
@@ -332,7 +332,7 @@ def march_exact(
                 if ((mask >> wp.uint64(cell)) & wp.uint64(1)) != wp.uint64(0):
                     first_block = views[index].block[CELLS * number + cell]
                     end_block = views[index].block[CELLS * number + cell + 1]
-                    hit = test_blocks(
+                    hit = meet_blocks(
                         views[index].rows,
                         first_block,
                         end_block,
