@@ -267,10 +267,11 @@ def knot_scene(segments: tuple[int, int], width: int, height: int) -> Scene:
         shape="torus_knot",
         params={"segments": list(segments)},
         rotate=(1, 0.3, 0, 50),
-        translate=(0.9, -1.5, 0.3),
+        scale=0.75,
+        translate=(1.2, -1.1, 0.1),
     )
     return Scene(
-        camera=Camera(eye=(0, -4.5, 0.8), look_at=(0.2, 0, 0.1), fov_y=40, width=width, height=height),
+        camera=Camera(eye=(-0.5, -4.5, 0.8), look_at=(0.4, 0, 0.0), fov_y=36, width=width, height=height),
         lights=(Light(kind="directional", direction=(0.3, 0.8, -0.7), radiance=(1.0, 1.0, 1.0)),),
         objects=(
             Object(name="ball", shape="sphere", material=Material(albedo=(0.02,) * 3, mirror=(0.9,) * 3)),
@@ -332,7 +333,7 @@ def frame_stages(quick: bool, rounds: int) -> dict[str, Any]:
                 renderer = ldtrefl.Renderer(scene, method)
                 first.append(renderer.render().stats.seconds)
                 # A camera that moves: the maps stay, everything else is done again.
-                camera = Camera(**{**vars_of(scene.camera), "eye": (0.001 * len(first), -4.5, 0.8)})
+                camera = Camera(**{**vars_of(scene.camera), "eye": (0.001 * len(first) - 0.5, -4.5, 0.8)})
                 moved.append(renderer.render(camera=camera).stats.seconds)
             stages[f"{method}, {threads} threads, first frame"] = _median_stages(first[1:])
             stages[f"{method}, {threads} threads, camera moved"] = _median_stages(moved[1:])
