@@ -33,23 +33,6 @@ def point_from_texel(axis: int, t: wp.vec3) -> wp.vec3:
     return wp.vec3(t[(5 - axis) % 3], t[(3 - axis) % 3], t[(4 - axis) % 3])
 
 
-@wp.func
-def face_depth(face: int, size: wp.vec3i, p: wp.vec3) -> float:
-    """Depth of a texel-space point seen from ``face``: 0 on the face, growing into the box."""
-    axis = face / 2
-    if face % 2 == 0:
-        return float(size[axis]) - p[axis]
-    return p[axis]
-
-
-@wp.func
-def facing(axis: int, direction: wp.vec3) -> int:
-    """The face of ``axis`` that a ray of this direction comes from: the sign of its component, negated."""
-    if direction[axis] > 0.0:
-        return 2 * axis + 1
-    return 2 * axis
-
-
 @dataclasses.dataclass(frozen=True)
 class TexelFrame:
     """The box of texels about a mesh: ``texel = scale * unit + offset``."""

@@ -18,7 +18,8 @@ from ldtrefl.cubemap import FACE_NAMES, TexelFrame, texel_frame
 from ldtrefl.device_scene import DeviceMesh
 from ldtrefl.errors import InputError, first_fault, unknown_name
 from ldtrefl.fragments import LdtView
-from ldtrefl.grid import Grid, Quality, build_grid
+from ldtrefl.grid import Grid
+from ldtrefl.grid_build import Quality, build_grid
 from ldtrefl.march import TRACERS
 from ldtrefl.mesh import Mesh
 from ldtrefl.peel import Rasteriser, sort_fragments

@@ -26,6 +26,7 @@ BOTTOM_TO_TOP = (
     "binning",
     "peel",
     "grid",
+    "grid_build",
     "trace",
     "march",
     "ldt",

@@ -33,7 +33,7 @@ from embreex.mesh_construction import TriangleMesh
 import ldtrefl
 from ldtrefl import launch, metrics, shapes
 from ldtrefl.device_scene import DeviceMesh
-from ldtrefl.grid import Quality
+from ldtrefl.grid_build import Quality
 from ldtrefl.ldt import peel_mesh
 from ldtrefl.march import TRACERS
 from ldtrefl.raycast import BVH, Raycaster

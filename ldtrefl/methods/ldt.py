@@ -23,7 +23,7 @@ from pydantic.dataclasses import dataclass
 
 from ldtrefl.cull import CullTest, find_regions
 from ldtrefl.gbuffer import GBuffer
-from ldtrefl.grid import Quality
+from ldtrefl.grid_build import Quality
 from ldtrefl.launch import Stats
 from ldtrefl.ldt import (
     BINARY_STEPS,
