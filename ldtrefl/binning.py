@@ -1,20 +1,23 @@
-"""Sorting items into bins by number: count, prefix sum, place.
+"""Sorting items into bins by number, and listing some of many items.
 
-Stable and the same for any number of threads: each part of a launch owns a run of bins and goes through the items in
-order (``launch.launch_parts``). On CUDA the order within a bin is left to chance.
+*Bins*: count, prefix sum, place. Stable and the same for any number of threads: each part of a launch owns a run of
+bins and goes through the items in order (``launch.launch_parts``). On CUDA the order within a bin is left to chance.
+
+*Chunks*: a kernel that keeps few of its items goes through them in chunks, each of which lists what it keeps where the
+chunk's own items stand; the lists are then joined. Only the chunks' counts are summed, not a mark for every item.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
 
 import warp as wp
 
 from ldtrefl import launch
 
-
-@wp.func
-def bin_is_in_part(number: int, bins: int, part: int, parts: int) -> bool:
-    """Whether a bin belongs to one of ``parts`` equal runs of the bins."""
-    return int(wp.int64(number) * wp.int64(parts) / wp.int64(bins)) == part
+CHUNK = wp.constant(1024)
+"""Items in a chunk."""
 
 
 @launch.kernel
@@ -23,13 +26,13 @@ def count_items(
     parts: int,
     # In:
     numbers: wp.array(dtype=wp.int32),
-    bins: int,
+    bins_per_part: int,
     # Out:
     counts_out: wp.array(dtype=wp.int32),
 ):
     i = wp.tid()
     number = numbers[i]
-    if bin_is_in_part(number, bins, part, parts):
+    if number / bins_per_part == part:
         wp.atomic_add(counts_out, number, 1)
 
 
@@ -39,7 +42,7 @@ def place_items(
     parts: int,
     # In:
     numbers: wp.array(dtype=wp.int32),
-    bins: int,
+    bins_per_part: int,
     start: wp.array(dtype=wp.int32),
     # Out:
     filled_out: wp.array(dtype=wp.int32),
@@ -47,22 +50,32 @@ def place_items(
 ):
     i = wp.tid()
     number = numbers[i]
-    if bin_is_in_part(number, bins, part, parts):
+    if number / bins_per_part == part:
         places_out[i] = start[number] + wp.atomic_add(filled_out, number, 1)
 
 
 @launch.kernel
-def list_marked(
+def copy_lists(
     first: int,
     # In:
-    marked: wp.array(dtype=wp.int32),
+    lists: wp.array(dtype=wp.int32),
     places: wp.array(dtype=wp.int32),
     # Out:
     list_out: wp.array(dtype=wp.int32),
 ):
-    i = first + wp.tid()
-    if marked[i] != 0:
-        list_out[places[i]] = i
+    chunk = first + wp.tid()
+    for k in range(places[chunk + 1] - places[chunk]):
+        list_out[places[chunk] + k] = lists[CHUNK * chunk + k]
+
+
+def chunk_count(items: int) -> int:
+    """Chunks that hold so many items."""
+    return -(-items // int(CHUNK))
+
+
+def launch_chunks(kernel: wp.Kernel, items: int, arguments: Sequence[Any], device: wp.Device) -> None:
+    """Run a kernel over the chunks of ``items``."""
+    launch.launch(kernel, chunk_count(items), arguments, device)
 
 
 def exclusive_scan(counts: wp.array) -> tuple[wp.array, int]:
@@ -80,18 +93,26 @@ def bin_items(numbers: wp.array, bins: int, device: wp.Device) -> tuple[wp.array
         places: (items,) int32, the place of each item.
     """
     items = numbers.shape[0]
+    parts = launch.part_count(count_items, items, device)
+    bins_per_part = -(-bins // parts)
     counts = wp.zeros(bins + 1, dtype=wp.int32, device=device)
-    launch.launch_parts(count_items, items, [numbers, bins, counts], device)
+    launch.launch_parts(count_items, items, [numbers, bins_per_part, counts], device, parts)
     start, _ = exclusive_scan(counts)
     counts.zero_()
     places = wp.empty(items, dtype=wp.int32, device=device)
-    launch.launch_parts(place_items, items, [numbers, bins, start, counts, places], device)
+    launch.launch_parts(place_items, items, [numbers, bins_per_part, start, counts, places], device, parts)
     return start, places
 
 
-def list_items(marked: wp.array) -> wp.array:
-    """Numbers of the items marked with 1, in order; ``marked`` has one entry more than there are items, a 0."""
-    places, count = exclusive_scan(marked)
-    listed = wp.empty(count, dtype=wp.int32, device=marked.device)
-    launch.launch(list_marked, marked.shape[0] - 1, [marked, places, listed], marked.device)
-    return listed
+def gather_lists(lists: wp.array, counts: wp.array) -> wp.array:
+    """One list of what each chunk listed, in order.
+
+    Args:
+        lists: (items,) int32; a chunk's list starts at its first item.
+        counts: (chunks + 1,) int32, lengths of the lists, a 0 at the end.
+    """
+    places, total = exclusive_scan(counts)
+    gathered = wp.empty(total, dtype=wp.int32, device=lists.device)
+    if total:
+        launch_chunks(copy_lists, lists.shape[0], [lists, places, gathered], lists.device)
+    return gathered

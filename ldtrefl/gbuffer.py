@@ -13,21 +13,30 @@ import numpy as np
 import warp as wp
 
 from ldtrefl import launch
-from ldtrefl.binning import list_items
+from ldtrefl.binning import CHUNK, chunk_count, gather_lists, launch_chunks
 from ldtrefl.camera import CameraView, camera_view, pixels_from_world
 from ldtrefl.device_scene import DeviceScene, ObjectRecord
-from ldtrefl.raster import homogeneous_triangle, inverse_depth, perspective_weights
+from ldtrefl.raster import homogeneous_triangle, inverse_depth, perspective_weights, planar_nearness
 from ldtrefl.scene import Camera
 from ldtrefl.shade import surface_at
 
+LARGE_BOX = wp.constant(4096)
+"""Pixels in a triangle's box from which it is drawn in bands of rows, so that all threads share it."""
+
 BAND = wp.constant(8)
-"""Rows that a thread draws before it leaves as many to each of the others: an object is spread over all threads."""
+"""Rows of such a band."""
 
 EDGE_SLACK = wp.constant(wp.float64(1.0e-6))
 """Pixels by which a triangle's box is widened, for centres that lie on its edge up to rounding."""
 
+GUARD = wp.constant(wp.float64(1 << 20))
+"""Pixels about the image within which a triangle is drawn in the plane; others are drawn homogeneous."""
+
 BEHIND = wp.constant(wp.float64(0.0))
 """Depth up to which a point is not in front of the camera."""
+
+NEAREST = wp.constant(wp.float64(1.0e-300))
+"""Depth from which 1 / depth is finite."""
 
 
 @wp.struct
@@ -49,12 +58,25 @@ def project_vertices(
     row_y: wp.vec4d,
     row_z: wp.vec4d,
     first_vertex: int,
-    # Out:
+    # Out: (x, y, 1 / depth) in pixels in front of the camera; elsewhere (x depth, y depth, depth)
     corners_out: wp.array(dtype=wp.vec3d),
 ):
     i = first + wp.tid()
     p = wp.vec4d(wp.float64(vertices[i][0]), wp.float64(vertices[i][1]), wp.float64(vertices[i][2]), wp.float64(1.0))
-    corners_out[first_vertex + i] = wp.vec3d(wp.dot(row_x, p), wp.dot(row_y, p), wp.dot(row_z, p))
+    x, y, depth = wp.dot(row_x, p), wp.dot(row_y, p), wp.dot(row_z, p)
+    corners_out[first_vertex + i] = wp.vec3d(x, y, wp.min(depth, BEHIND))
+    if depth > NEAREST:
+        nearness = wp.float64(1.0) / depth
+        corners_out[first_vertex + i] = wp.vec3d(x * nearness, y * nearness, nearness)
+
+
+@wp.func
+def homogeneous(corner: wp.vec3d) -> wp.vec3d:
+    """(x depth, y depth, depth) of what ``project_vertices`` wrote."""
+    if corner[2] > BEHIND:
+        depth = wp.float64(1.0) / corner[2]
+        return wp.vec3d(corner[0] * depth, corner[1] * depth, depth)
+    return corner
 
 
 @wp.struct
@@ -65,47 +87,47 @@ class PixelBox:
     last_x: int
     first_y: int
     last_y: int
+    planar: bool  # all corners lie in front of the camera and within the guard
 
 
 @wp.func
-def clamped_pixel(x: wp.float64, last: int) -> int:
-    """A pixel number brought to -1 .. last + 1 before it is turned into an integer."""
-    return int(wp.clamp(x, wp.float64(-1.0), wp.float64(last + 1)))
+def first_pixel(low: wp.float64) -> int:
+    """The first pixel whose centre is not below ``low``, up to rounding; ``low`` within the guard."""
+    return int(low + (GUARD + wp.float64(0.5) - EDGE_SLACK)) - int(GUARD)
+
+
+@wp.func
+def last_pixel(high: wp.float64) -> int:
+    """The last pixel whose centre is not above ``high``, up to rounding; ``high`` within the guard."""
+    return int(high + (GUARD - wp.float64(0.5) + EDGE_SLACK)) - int(GUARD)
 
 
 @wp.func
 def pixel_box(a: wp.vec3d, b: wp.vec3d, c: wp.vec3d, width: int, height: int) -> PixelBox:
-    """The pixels whose centres lie in the box about a projected triangle."""
+    """The pixels whose centres lie in the box about a projected triangle; all where that has no bounds."""
     box = PixelBox()
+    nearest = wp.max(a[2], wp.max(b[2], c[2]))
+    farthest = wp.min(a[2], wp.min(b[2], c[2]))
     box.last_x = -1
-    w, h = wp.float64(width), wp.float64(height)
-    # Wholly behind the camera, or wholly beyond one side of the view?
-    if a[2] <= BEHIND and b[2] <= BEHIND and c[2] <= BEHIND:
-        return box
-    zero = wp.float64(0.0)
-    if (a[0] < zero and b[0] < zero and c[0] < zero) or (a[1] < zero and b[1] < zero and c[1] < zero):
-        return box
-    if (a[0] > w * a[2] and b[0] > w * b[2] and c[0] > w * c[2]) or (
-        a[1] > h * a[2] and b[1] > h * b[2] and c[1] > h * c[2]
-    ):
-        return box
-    box.last_x = width - 1
-    box.last_y = height - 1
-    if a[2] > BEHIND and b[2] > BEHIND and c[2] > BEHIND:
-        ax, bx, cx = a[0] / a[2], b[0] / b[2], c[0] / c[2]
-        ay, by, cy = a[1] / a[2], b[1] / b[2], c[1] / c[2]
-        slack = wp.float64(0.5) + EDGE_SLACK
-        under = wp.float64(0.5) - EDGE_SLACK
-        box.first_x = wp.max(clamped_pixel(wp.ceil(wp.min(ax, wp.min(bx, cx)) - slack), width), 0)
-        box.last_x = wp.min(clamped_pixel(wp.floor(wp.max(ax, wp.max(bx, cx)) - under), width), width - 1)
-        box.first_y = wp.max(clamped_pixel(wp.ceil(wp.min(ay, wp.min(by, cy)) - slack), height), 0)
-        box.last_y = wp.min(clamped_pixel(wp.floor(wp.max(ay, wp.max(by, cy)) - under), height), height - 1)
+    if nearest > BEHIND:
+        low_x, high_x = wp.min(a[0], wp.min(b[0], c[0])), wp.max(a[0], wp.max(b[0], c[0]))
+        low_y, high_y = wp.min(a[1], wp.min(b[1], c[1])), wp.max(a[1], wp.max(b[1], c[1]))
+        limit = GUARD - wp.float64(1.0)
+        box.planar = farthest > BEHIND and wp.min(low_x, low_y) > -limit and wp.max(high_x, high_y) < limit
+        if box.planar:
+            box.first_x = wp.max(first_pixel(low_x), 0)
+            box.last_x = wp.min(last_pixel(high_x), width - 1)
+            box.first_y = wp.max(first_pixel(low_y), 0)
+            box.last_y = wp.min(last_pixel(high_y), height - 1)
+        else:
+            box.last_x = width - 1
+            box.last_y = height - 1
     return box
 
 
 @wp.struct
 class ProjectedMesh:
-    """An object's triangles in homogeneous pixel coordinates, and the image."""
+    """An object's projected triangles, and the image."""
 
     faces: wp.array(dtype=wp.vec3i)
     corners: wp.array(dtype=wp.vec3d)  # of all objects' vertices
@@ -115,62 +137,113 @@ class ProjectedMesh:
     height: int
 
 
-@launch.kernel
-def find_visible(
-    first: int,
-    # In:
-    mesh: ProjectedMesh,
-    # Out: 1 where the triangle may cover a pixel's centre, and the pixels it may cover
-    visible_out: wp.array(dtype=wp.int32),
-    box_out: wp.array(dtype=PixelBox),
+KEEP_LARGEST = """
+#if defined(__CUDA_ARCH__)
+    atomicMax((long long*)(values.data + index), (long long)value);
+#else
+    auto* place = values.data + index;
+    auto seen = __atomic_load_n(place, __ATOMIC_RELAXED);
+    while (seen < value &&
+        !__atomic_compare_exchange_n(place, &seen, value, true, __ATOMIC_RELAXED, __ATOMIC_RELAXED)) {}
+#endif
+"""
+
+
+@wp.func_native(KEEP_LARGEST)
+def keep_largest(values: wp.array(dtype=wp.int64), index: int, value: wp.int64):
+    """``values[index] = max(values[index], value)``, whoever else does the same: Warp's own is not atomic on the CPU.
+
+    The largest does not depend on the order, so the image does not depend on the threads.
+    """
+    ...
+
+
+@wp.func
+def keep_nearest(mesh: ProjectedMesh, triangle: int, x: int, y: int, nearness: float, keys: wp.array(dtype=wp.int64)):
+    """Put a triangle's point into a pixel's key."""
+    if nearness > 0.0:
+        number = wp.int64(mesh.first_triangle + triangle)
+        keep_largest(keys, y * mesh.width + x, (wp.int64(wp.cast(nearness, wp.int32)) << wp.int64(32)) | number)
+
+
+@wp.func
+def draw_rows(
+    mesh: ProjectedMesh, triangle: int, box: PixelBox, first_y: int, last_y: int, keys: wp.array(dtype=wp.int64)
 ):
-    triangle = first + wp.tid()
+    """Draw a triangle's pixels from row ``first_y`` to ``last_y``."""
     face = mesh.faces[triangle]
-    box = pixel_box(
+    a = mesh.corners[mesh.first_vertex + face[0]]
+    b = mesh.corners[mesh.first_vertex + face[1]]
+    c = mesh.corners[mesh.first_vertex + face[2]]
+    half = wp.float64(0.5)
+    if box.planar:
+        for y in range(first_y, last_y + 1):
+            for x in range(box.first_x, box.last_x + 1):
+                nearness = planar_nearness(a, b, c, wp.float64(x) + half, wp.float64(y) + half)
+                keep_nearest(mesh, triangle, x, y, nearness, keys)
+    else:
+        tri = homogeneous_triangle(homogeneous(a), homogeneous(b), homogeneous(c))
+        for y in range(first_y, last_y + 1):
+            for x in range(box.first_x, box.last_x + 1):
+                at = perspective_weights(tri, wp.float64(x) + half, wp.float64(y) + half)
+                if wp.min(at) >= BEHIND and tri.volume != BEHIND:
+                    keep_nearest(mesh, triangle, x, y, inverse_depth(tri, at), keys)
+
+
+@wp.func
+def triangle_box(mesh: ProjectedMesh, triangle: int) -> PixelBox:
+    """:func:`pixel_box` of a triangle."""
+    face = mesh.faces[triangle]
+    return pixel_box(
         mesh.corners[mesh.first_vertex + face[0]],
         mesh.corners[mesh.first_vertex + face[1]],
         mesh.corners[mesh.first_vertex + face[2]],
         mesh.width,
         mesh.height,
     )
-    if box.first_x <= box.last_x and box.first_y <= box.last_y:
-        visible_out[triangle] = 1
-        box_out[triangle] = box
 
 
 @launch.kernel
-def draw_triangles(
-    part: int,
-    parts: int,
+def draw_small_triangles(
+    first: int,
     # In:
     mesh: ProjectedMesh,
-    visible: wp.array(dtype=wp.int32),
-    boxes: wp.array(dtype=PixelBox),
     # Out: a pixel's key holds 1 / depth in its upper half, the triangle in its lower
     key_out: wp.array(dtype=wp.int64),
+    # Out, per chunk: triangles that are too large, and their list
+    count_out: wp.array(dtype=wp.int32),
+    list_out: wp.array(dtype=wp.int32),
 ):
-    triangle = visible[wp.tid()]
-    box = boxes[triangle]
-    if box.first_y / BAND == box.last_y / BAND and (box.first_y / BAND) % parts != part:
-        return
-    face = mesh.faces[triangle]
-    a = mesh.corners[mesh.first_vertex + face[0]]
-    b = mesh.corners[mesh.first_vertex + face[1]]
-    c = mesh.corners[mesh.first_vertex + face[2]]
-    tri = homogeneous_triangle(a, b, c)
-    if tri.volume == wp.float64(0.0):
-        return
-    zero = wp.float64(0.0)
-    for y in range(box.first_y, box.last_y + 1):
-        if (y / BAND) % parts == part:
-            for x in range(box.first_x, box.last_x + 1):
-                at = perspective_weights(tri, wp.float64(x) + wp.float64(0.5), wp.float64(y) + wp.float64(0.5))
-                if at[0] >= zero and at[1] >= zero and at[2] >= zero:
-                    nearness = inverse_depth(tri, at)
-                    if nearness > 0.0:
-                        number = wp.int64(mesh.first_triangle + triangle)
-                        key = (wp.int64(wp.cast(nearness, wp.int32)) << wp.int64(32)) | number
-                        wp.atomic_max(key_out, y * mesh.width + x, key)
+    chunk = first + wp.tid()
+    begin = CHUNK * chunk
+    count = int(0)
+    for triangle in range(begin, wp.min(begin + CHUNK, mesh.faces.shape[0])):
+        box = triangle_box(mesh, triangle)
+        # Most triangles of a dense mesh lie between pixel centres and end here.
+        if box.first_x <= box.last_x and box.first_y <= box.last_y:
+            if (box.last_x - box.first_x + 1) * (box.last_y - box.first_y + 1) < LARGE_BOX:
+                draw_rows(mesh, triangle, box, box.first_y, box.last_y, key_out)
+            else:
+                list_out[begin + count] = triangle
+                count += 1
+    count_out[chunk] = count
+
+
+@launch.kernel
+def draw_large_triangles(
+    first: int,
+    # In:
+    mesh: ProjectedMesh,
+    large: wp.array(dtype=wp.int32),
+    # Out:
+    key_out: wp.array(dtype=wp.int64),
+):
+    i = first + wp.tid()
+    bands = (mesh.height + BAND - 1) / BAND
+    triangle = large[i / bands]
+    box = triangle_box(mesh, triangle)
+    band = BAND * (i % bands)
+    draw_rows(mesh, triangle, box, wp.max(box.first_y, band), wp.min(box.last_y, band + BAND - 1), key_out)
 
 
 @wp.func
@@ -206,15 +279,16 @@ def resolve_pixels(
     if keys[i] == wp.int64(0):
         object_out[i] = -1
         triangle_out[i] = -1
+        barycentrics_out[i] = wp.vec2(0.0, 0.0)
         return
     number = int(keys[i] & wp.int64(0x7FFFFFFF))
     index = object_of(first_triangles, number)
     triangle = number - first_triangles[index]
     face = objects[index].faces[triangle]
     tri = homogeneous_triangle(
-        corners[first_vertices[index] + face[0]],
-        corners[first_vertices[index] + face[1]],
-        corners[first_vertices[index] + face[2]],
+        homogeneous(corners[first_vertices[index] + face[0]]),
+        homogeneous(corners[first_vertices[index] + face[1]]),
+        homogeneous(corners[first_vertices[index] + face[2]]),
     )
     x, y = wp.float64(i % width) + wp.float64(0.5), wp.float64(i / width) + wp.float64(0.5)
     at = perspective_weights(tri, x, y)
@@ -291,7 +365,7 @@ class GBuffer:
     def reflector_mask(self) -> np.ndarray:
         """(h, w) bool: pixels that see a reflector."""
         mirrors = np.array([entry.source.is_reflector for entry in self.scene.objects] + [False])
-        return mirrors[self.objects]  # -1 picks the last, False
+        return mirrors.take(self.objects, mode="wrap")  # -1 picks the last, False
 
     @functools.cached_property
     def surfaces(self) -> tuple[wp.array, wp.array]:
@@ -316,20 +390,19 @@ def draw_gbuffer(scene: DeviceScene, camera: Camera, *, without: int = -1) -> GB
             continue
         mesh, rows = entry.geometry, [wp.vec4d(*row) for row in from_world @ entry.world_from_unit]
         launch.launch(project_vertices, len(mesh.vertices), [mesh.vertices, *rows, first_vertex, corners], device)
-        # Most triangles of a dense mesh lie between pixel centres: find the others once, for all threads.
         triangles = len(mesh.faces)
         projected = ProjectedMesh()
         projected.faces, projected.corners = mesh.faces, corners
         projected.first_vertex, projected.first_triangle = first_vertex, entry.record.first_triangle
         projected.width, projected.height = width, height
-        marked = wp.zeros(triangles + 1, dtype=wp.int32, device=device)
-        boxes = wp.empty(triangles, dtype=PixelBox, device=device)
-        launch.launch(find_visible, triangles, [projected, marked, boxes], device)
-        visible = list_items(marked)
-        launch.launch_parts(draw_triangles, visible.shape[0], [projected, visible, boxes, keys], device)
+        counts = wp.zeros(chunk_count(triangles) + 1, dtype=wp.int32, device=device)
+        listed = wp.empty(triangles, dtype=wp.int32, device=device)
+        launch_chunks(draw_small_triangles, triangles, [projected, keys, counts, listed], device)
+        large = gather_lists(listed, counts)
+        launch.launch(draw_large_triangles, large.shape[0] * -(-height // int(BAND)), [projected, large, keys], device)
     view = GBufferView()
     view.object, view.triangle = (wp.empty(pixels, dtype=wp.int32, device=device) for _ in range(2))
-    view.barycentrics = wp.zeros(pixels, dtype=wp.vec2, device=device)
+    view.barycentrics = wp.empty(pixels, dtype=wp.vec2, device=device)
     view.camera = camera_view(camera, scene.device_from_world)
     if scene.objects:
         firsts = wp.array([entry.record.first_triangle for entry in scene.objects], dtype=wp.int32, device=device)

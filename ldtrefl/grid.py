@@ -49,10 +49,24 @@ class GridView:
     bricks: wp.vec3i  # along x, y, z
     low: wp.vec3  # the object's box, cell space
     high: wp.vec3
+    front: float  # side of the records that can be seen from outside, 1 or -1 along their normals; 0 if not known
     cells_per_unit: float  # cell = cells_per_unit * unit + cell_offset
     cell_offset: wp.vec3
     vertices: wp.array(dtype=wp.vec3)  # unit space
     faces: wp.array(dtype=wp.vec3i)
+
+
+@wp.func
+def cell_number(x: float, cells: int) -> int:
+    """The cell that holds a coordinate; the nearest if none does."""
+    return wp.clamp(int(wp.floor(x)), 0, cells - 1)
+
+
+@wp.func
+def number_of_cell(bricks: wp.vec3i, x: int, y: int, z: int) -> int:
+    """Number of a cell among all: brick by brick, 64 cells each."""
+    brick = ((z / BRICK) * bricks[1] + y / BRICK) * bricks[0] + x / BRICK
+    return CELLS * brick + ((z % BRICK) * BRICK + y % BRICK) * BRICK + x % BRICK
 
 
 @dataclass(frozen=True, eq=False)

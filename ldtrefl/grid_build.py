@@ -11,11 +11,11 @@ import numpy as np
 import warp as wp
 
 from ldtrefl import launch
-from ldtrefl.binning import bin_items, exclusive_scan, list_items
-from ldtrefl.cubemap import TexelFrame, point_from_texel, texel_frame
+from ldtrefl.binning import bin_items, exclusive_scan
+from ldtrefl.cubemap import TexelFrame, texel_frame
 from ldtrefl.device_scene import DeviceMesh
-from ldtrefl.grid import BRICK, CELLS, LANES, LARGE_PATCH, ROWS, SMALL_PATCH, TRIANGLE, Grid, GridView
-from ldtrefl.peel import Fragments, Rasteriser
+from ldtrefl.grid import BRICK, CELLS, LANES, ROWS, TRIANGLE, Grid, GridView, cell_number, number_of_cell
+from ldtrefl.patches import Piece, Survey
 
 Quality = Literal["fast", "balanced", "exact"]
 
@@ -31,23 +31,16 @@ PATCH_TEXELS: dict[Quality, float] = {"fast": 4.0, "balanced": 1.6}
 """Texels along a side of a patch. The plane of one is off by the square of its side: on a torus knot at 256, 1.6 texels
 give 0.15% wrong hits and a tenth of a texel at the 99th percentile; 1 texel a third of that at 15% more time."""
 
-DENSE = 1.5
-"""Triangles per texel of surface from which patches stand for triangles: the maps are then the coarser picture."""
+DENSE = 2.2
+"""Small triangles per texel of surface from which patches stand for them: the maps are then the coarser picture."""
 DENSE_TRIANGLES = 300_000
 """Triangles from which a grid that keeps them all has more cells."""
 
-FACING = wp.constant(0.55)
-"""|n . axis| from which a map keeps a fragment as a patch: every direction faces one of the three with 0.577 or more.
-At 0.577 itself, where two maps meet on a bent surface, twice as many rays slipped between their patches."""
-PATCH_MARGIN = wp.constant(0.06)
-"""Part of a patch's side added around it, so that neighbours on a bent surface overlap instead of leaving a slit. With
-0.02 one ray in a thousand slipped through to the far wall, specks in the picture; with 0.06 none did, at a fifth more
-wrong hits along silhouettes."""
-LARGE = wp.constant(2.0)
-"""Patches across from which a triangle of a dense mesh is kept as it is."""
-
 CELL_MARGIN = wp.constant(1.0e-3)
 """Cells by which cells are widened when records are put into them, for the rounding of rays."""
+PATCH_RISE = wp.vec3(0.1)
+"""Cells, a third of a patch, by which the box is widened for patches that rise out of it where the surface bends.
+Without it one ray in ten thousand slipped under them to the far wall."""
 LARGEST_LEAP = wp.constant(250)
 """Bricks: what fits in a byte, and more than a grid has."""
 
@@ -61,28 +54,12 @@ class CellBox:
 
 
 @wp.struct
-class Piece:
-    """A record's shape: corner, and the two edges from it; a triangle, or a parallelogram."""
-
-    corner: wp.vec3
-    edge_u: wp.vec3
-    edge_v: wp.vec3
-    kind: float  # TRIANGLE, or a patch: a parallelogram; 0 for no piece
-
-
-@wp.struct
 class GridTarget:
     """What records are made from, and the cells that they go into."""
 
     vertices: wp.array(dtype=wp.vec3)  # unit space
     faces: wp.array(dtype=wp.vec3i)
-    texel: wp.array(dtype=wp.int32)  # fragments, raw
-    depth: wp.array(dtype=wp.float32)
-    reference: wp.array(dtype=wp.int32)
-    patches: wp.array(dtype=Piece)  # of the fragments
-    size: wp.vec3i  # of the maps, texels
-    first_texel: wp.vec3i
-    cells_per_texel: float
+    patches: wp.array(dtype=Piece)
     cells_per_unit: float
     cell_offset: wp.vec3
     bricks: wp.vec3i
@@ -100,70 +77,16 @@ def triangle_piece(target: GridTarget, triangle: int) -> Piece:
     piece.edge_u = b - a
     piece.edge_v = c - a
     piece.kind = TRIANGLE
+    piece.triangle = triangle
     return piece
-
-
-@wp.func
-def patch_piece(target: GridTarget, fragment: int) -> Piece:
-    """A fragment's texel lifted to its triangle's plane, in cell space; none where the map does not face it."""
-    number = target.texel[fragment]
-    axis = int(0)
-    if number >= target.first_texel[1]:
-        axis = 1
-    if number >= target.first_texel[2]:
-        axis = 2
-    piece = Piece()
-    corners = target.faces[target.reference[fragment] >> 1]
-    a, b, c = target.vertices[corners[0]], target.vertices[corners[1]], target.vertices[corners[2]]
-    normal = wp.normalize(wp.cross(b - a, c - a))
-    if wp.abs(normal[axis]) < FACING:
-        return piece
-    within = number - target.first_texel[axis]
-    columns = target.size[(axis + 1) % 3]
-    u, v = float(within % columns), float(within / columns)
-    slope_u, slope_v = -normal[(axis + 1) % 3] / normal[axis], -normal[(axis + 2) % 3] / normal[axis]
-    half, side = 0.5 + PATCH_MARGIN, 1.0 + 2.0 * PATCH_MARGIN
-    depth = target.depth[fragment] - half * (slope_u + slope_v)
-    scale = target.cells_per_texel
-    piece.corner = scale * point_from_texel(axis, wp.vec3(u - PATCH_MARGIN, v - PATCH_MARGIN, depth))
-    piece.edge_u = scale * side * point_from_texel(axis, wp.vec3(1.0, 0.0, slope_u))
-    piece.edge_v = scale * side * point_from_texel(axis, wp.vec3(0.0, 1.0, slope_v))
-    if normal[axis] < 0.0:
-        # The record's normal is the triangle's.
-        along_u = scale * side * point_from_texel(axis, wp.vec3(0.0, 1.0, slope_v))
-        piece.edge_v = scale * side * point_from_texel(axis, wp.vec3(1.0, 0.0, slope_u))
-        piece.edge_u = along_u
-    piece.kind = SMALL_PATCH
-    extent = wp.max(wp.max(a, wp.max(b, c)) - wp.min(a, wp.min(b, c)))
-    if target.cells_per_unit * extent > scale:
-        piece.kind = LARGE_PATCH
-    return piece
-
-
-@launch.kernel
-def make_patches(
-    first: int,
-    # In:
-    target: GridTarget,
-    # Out:
-    patches_out: wp.array(dtype=Piece),
-):
-    i = first + wp.tid()
-    patches_out[i] = patch_piece(target, i)
 
 
 @wp.func
 def piece_of(target: GridTarget, item: int) -> Piece:
-    """Items from 0 are triangles, below 0 fragments: -1 is fragment 0."""
+    """Items from 0 are triangles, below 0 patches: -1 is patch 0."""
     if item >= 0:
         return triangle_piece(target, item)
     return target.patches[-1 - item]
-
-
-@wp.func
-def cell_number(x: float, cells: int) -> int:
-    """The cell that holds a coordinate; the nearest if none does."""
-    return wp.clamp(int(wp.floor(x)), 0, cells - 1)
 
 
 @wp.func
@@ -224,13 +147,6 @@ def touches_cell(piece: Piece, x: int, y: int, z: int) -> bool:
     return piece.kind > TRIANGLE or not edges_are_apart(piece.edge_v - piece.edge_u, local, half)
 
 
-@wp.func
-def brick_major(bricks: wp.vec3i, x: int, y: int, z: int) -> int:
-    """Number of a cell: bricks in a row, 64 cells each."""
-    brick = ((z / BRICK) * bricks[1] + y / BRICK) * bricks[0] + x / BRICK
-    return CELLS * brick + ((z % BRICK) * BRICK + y % BRICK) * BRICK + x % BRICK
-
-
 @launch.kernel
 def find_cells(
     first: int,
@@ -245,6 +161,7 @@ def find_cells(
     counts_out: wp.array(dtype=wp.int32),
     cell_out: wp.array(dtype=wp.int32),
     item_out: wp.array(dtype=wp.int32),
+    touched_out: wp.array(dtype=wp.uint8),  # 1 for cells with a pair: the same value from whoever writes
 ):
     i = first + wp.tid()
     item = first_item + step * i
@@ -259,59 +176,27 @@ def find_cells(
             return
     piece = piece_of(target, item)
     count = int(0)
-    if piece.kind > 0.0:
-        box = cells_touched(target, piece)
-        if box.first == box.last:
-            count = 1
-            if is_counting == 0:
-                cell_out[place] = brick_major(target.bricks, box.first[0], box.first[1], box.first[2])
-                item_out[place] = item
-        else:
-            for z in range(box.first[2], box.last[2] + 1):
-                for y in range(box.first[1], box.last[1] + 1):
-                    for x in range(box.first[0], box.last[0] + 1):
-                        if touches_cell(piece, x, y, z):
-                            if is_counting == 0:
-                                cell_out[place + count] = brick_major(target.bricks, x, y, z)
-                                item_out[place + count] = item
-                            count += 1
+    box = cells_touched(target, piece)
+    if box.first == box.last:
+        count = 1
+        if is_counting == 0:
+            cell = number_of_cell(target.bricks, box.first[0], box.first[1], box.first[2])
+            cell_out[place] = cell
+            item_out[place] = item
+            touched_out[cell] = wp.uint8(1)
+    else:
+        for z in range(box.first[2], box.last[2] + 1):
+            for y in range(box.first[1], box.last[1] + 1):
+                for x in range(box.first[0], box.last[0] + 1):
+                    if touches_cell(piece, x, y, z):
+                        if is_counting == 0:
+                            cell = number_of_cell(target.bricks, x, y, z)
+                            cell_out[place + count] = cell
+                            item_out[place + count] = item
+                            touched_out[cell] = wp.uint8(1)
+                        count += 1
     if is_counting != 0:
         counts_out[i] = count
-
-
-@launch.kernel
-def mark_cells(
-    first: int,
-    # In:
-    cell: wp.array(dtype=wp.int32),
-    # Out: the same value from whoever writes
-    marked_out: wp.array(dtype=wp.uint8),
-):
-    i = first + wp.tid()
-    marked_out[cell[i]] = wp.uint8(1)
-
-
-@launch.kernel
-def find_needed_triangles(
-    first: int,
-    # In:
-    target: GridTarget,
-    marked: wp.array(dtype=wp.uint8),
-    # Out: 1 where patches do not stand for the triangle
-    needed_out: wp.array(dtype=wp.int32),
-):
-    i = first + wp.tid()
-    corners = target.faces[i]
-    a = target.cells_per_unit * target.vertices[corners[0]] + target.cell_offset
-    b = target.cells_per_unit * target.vertices[corners[1]] + target.cell_offset
-    c = target.cells_per_unit * target.vertices[corners[2]] + target.cell_offset
-    extent = wp.max(wp.max(a, wp.max(b, c)) - wp.min(a, wp.min(b, c)))
-    middle = (a + b + c) / 3.0
-    x = cell_number(middle[0], BRICK * target.bricks[0])
-    y = cell_number(middle[1], BRICK * target.bricks[1])
-    z = cell_number(middle[2], BRICK * target.bricks[2])
-    is_lost = marked[brick_major(target.bricks, x, y, z)] == wp.uint8(0)
-    needed_out[i] = int(is_lost or extent > LARGE * target.cells_per_texel)
 
 
 @launch.kernel
@@ -342,6 +227,7 @@ def lay_out_bricks(
     brick_out: wp.array(dtype=wp.int32),
     mask_out: wp.array(dtype=wp.uint64),
     block_out: wp.array(dtype=wp.int32),
+    rows_out: wp.array(dtype=wp.float32),  # a cell's last block cleared: it may be filled in part
 ):
     brick = first + wp.tid()
     if number[brick] == number[brick + 1]:
@@ -357,6 +243,8 @@ def lay_out_bricks(
         if records > 0:
             mask = mask | (wp.uint64(1) << wp.uint64(k))
             block += (records + LANES - 1) / LANES
+            for i in range(LANES * ROWS * (block - 1), LANES * ROWS * block):
+                rows_out[i] = 0.0
     block_out[CELLS * occupied + CELLS] = block
     mask_out[occupied] = mask
 
@@ -426,13 +314,10 @@ def fill_records(
     rank = places[i] - start[cell[i]]
     at = block[CELLS * number[brick] + cell[i] % CELLS] + rank / LANES
     lane = rank % LANES
-    if item[i] >= 0:
-        triangle_out[LANES * at + lane] = item[i]
-    else:
-        triangle_out[LANES * at + lane] = target.reference[-1 - item[i]] >> 1
     x, y = brick % target.bricks[0], (brick / target.bricks[0]) % target.bricks[1]
     z = brick / (target.bricks[0] * target.bricks[1])
     piece = piece_of(target, item[i])
+    triangle_out[LANES * at + lane] = piece.triangle
     corner = piece.corner - float(BRICK) * wp.vec3(float(x), float(y), float(z))
     normal = wp.cross(piece.edge_u, piece.edge_v)
     square = wp.dot(normal, normal)
@@ -460,68 +345,62 @@ def build_grid(geometry: DeviceMesh, resolution: int, quality: Quality) -> Grid:
     triangles = len(geometry.faces)
     if quality != "exact":
         frame = texel_frame(geometry.mesh, max(1, round(resolution / PATCH_TEXELS[quality])))
-        rasteriser = Rasteriser(geometry, frame)
-        if triangles > DENSE * rasteriser.count * PATCH_TEXELS[quality] ** 2:
-            raw = rasteriser.fragments()
-            target = _target(geometry, frame, raw, FAST_GRID_CELLS if quality == "fast" else GRID_CELLS)
-            cell, item = _patches_and_the_rest(target, raw, triangles)
-            return Grid(_built(target, geometry, cell, item), cell.shape[0], True)
+        target, ratio = _target(geometry, frame, FAST_GRID_CELLS if quality == "fast" else GRID_CELLS)
+        survey = Survey(geometry, frame, ratio, target.bricks)
+        if survey.small > DENSE * survey.count * PATCH_TEXELS[quality] ** 2:
+            target.patches = survey.patches()
+            cell, item = _patches_and_the_rest(target, survey)
+            view = _built(target, geometry, cell, item)
+            view.front = float(survey.front)
+            view.low, view.high = view.low - PATCH_RISE, view.high + PATCH_RISE
+            return Grid(view, cell.shape[0], True)
     cells = DENSE_GRID_CELLS if triangles > DENSE_TRIANGLES else GRID_CELLS
-    target = _target(geometry, texel_frame(geometry.mesh, resolution), None, cells)
-    cell, item = _cells_of(target, None, triangles, 0, 1, geometry.vertices.device)
+    target, _ = _target(geometry, texel_frame(geometry.mesh, resolution), cells)
+    cell, item, _ = _cells_of(target, None, triangles, 0, 1, geometry.vertices.device)
     return Grid(_built(target, geometry, cell, item), cell.shape[0], False)
 
 
-def _target(geometry: DeviceMesh, frame: TexelFrame, raw: Fragments | None, cells: int) -> Any:
+def _target(geometry: DeviceMesh, frame: TexelFrame, cells: int) -> tuple[Any, float]:
+    """The cells over a frame, and how many make a texel."""
     target = GridTarget()
     target.vertices, target.faces = geometry.vertices, geometry.faces
-    if raw is not None:
-        target.texel, target.depth, target.reference = raw.texel, raw.depth, raw.reference
-    target.size, target.first_texel = wp.vec3i(*frame.size), wp.vec3i(*frame.first_texels[:3])
     ratio = cells / max(frame.size)
-    target.cells_per_texel = ratio
     target.cells_per_unit = ratio * frame.scale
     target.cell_offset = wp.vec3(*(ratio * np.array(frame.offset)))
-    x, y, z = (max(1, int(np.ceil(side * ratio / int(BRICK) - 1e-6))) for side in frame.size)
-    target.bricks = wp.vec3i(x, y, z)
-    if raw is not None:
-        # Once, and not for every pass: a dense mesh's triangles are far apart in memory.
-        fragments, device = raw.texel.shape[0], raw.texel.device
-        patches = wp.empty(fragments, dtype=Piece, device=device)
-        launch.launch(make_patches, fragments, [target, patches], device)
-        target.patches = patches
-    return target
+    target.bricks = wp.vec3i(*(max(1, int(np.ceil(side * ratio / int(BRICK) - 1e-6))) for side in frame.size))
+    return target, ratio
 
 
 def _cells_of(
     target: Any, items: wp.array | None, count: int, first_item: int, step: int, device: wp.Device
-) -> tuple[wp.array, wp.array]:
-    """(cell, item) of every pair that touches; items listed, or else ``first_item + step * i``."""
+) -> tuple[wp.array, wp.array, wp.array]:
+    """(cell, item) of every pair that touches, and (cells,) uint8, 1 for cells touched; items listed, or else
+    ``first_item + step * i``."""
     listed = wp.empty(0, dtype=wp.int32, device=device) if items is None else items
     counts = wp.zeros(count + 1, dtype=wp.int32, device=device)
     nothing = wp.empty(0, dtype=wp.int32, device=device)
-    launch.launch(find_cells, count, [target, listed, first_item, step, nothing, 1, counts, nothing, nothing], device)
+    touched = wp.zeros(_brick_count(target) * int(CELLS), dtype=wp.uint8, device=device)
+    inputs = [target, listed, first_item, step]
+    launch.launch(find_cells, count, [*inputs, nothing, 1, counts, nothing, nothing, touched], device)
     places, total = exclusive_scan(counts)
     cell, item = (wp.empty(total, dtype=wp.int32, device=device) for _ in range(2))
-    launch.launch(find_cells, count, [target, listed, first_item, step, places, 0, nothing, cell, item], device)
-    return cell, item
+    launch.launch(find_cells, count, [*inputs, places, 0, nothing, cell, item, touched], device)
+    return cell, item, touched
 
 
-def _patches_and_the_rest(target: Any, raw: Fragments, triangles: int) -> tuple[wp.array, wp.array]:
-    """(cell, item) of all patches, and of the triangles that no patch stands for: large ones, and those in cells that
-    no patch touches, such as wires between texel centres."""
-    device = raw.texel.device
-    cell, item = _cells_of(target, None, raw.texel.shape[0], -1, -1, device)
-    bricks = target.bricks[0] * target.bricks[1] * target.bricks[2]
-    marked = wp.zeros(bricks * int(CELLS), dtype=wp.uint8, device=device)
-    launch.launch(mark_cells, cell.shape[0], [cell, marked], device)
-    needed = wp.zeros(triangles + 1, dtype=wp.int32, device=device)
-    launch.launch(find_needed_triangles, triangles, [target, marked, needed], device)
-    listed = list_items(needed)
-    if listed.shape[0] == 0:
+def _brick_count(target: Any) -> int:
+    return target.bricks[0] * target.bricks[1] * target.bricks[2]
+
+
+def _patches_and_the_rest(target: Any, survey: Survey) -> tuple[wp.array, wp.array]:
+    """(cell, item) of all patches, and of the triangles that no patch stands for."""
+    device = target.patches.device
+    cell, item, touched = _cells_of(target, None, survey.count, -1, -1, device)
+    kept = survey.kept_triangles(touched)
+    if kept.shape[0] == 0:
         return cell, item
-    more_cells, more_items = _cells_of(target, listed, listed.shape[0], 0, 0, device)
-    return tuple(_joined(a, b) for a, b in ((cell, more_cells), (item, more_items)))  # type: ignore[return-value]
+    more_cells, more_items, _ = _cells_of(target, kept, kept.shape[0], 0, 0, device)
+    return _joined(cell, more_cells), _joined(item, more_items)
 
 
 def _joined(a: wp.array, b: wp.array) -> wp.array:
@@ -533,7 +412,7 @@ def _joined(a: wp.array, b: wp.array) -> wp.array:
 
 def _built(target: Any, geometry: DeviceMesh, cell: wp.array, item: wp.array) -> Any:
     device = cell.device
-    bricks = target.bricks[0] * target.bricks[1] * target.bricks[2]
+    bricks = _brick_count(target)
     start, places = bin_items(cell, bricks * int(CELLS), device)
     occupied, blocks = (wp.zeros(bricks + 1, dtype=wp.int32, device=device) for _ in range(2))
     launch.launch(find_occupied_bricks, bricks, [start, occupied, blocks], device)
@@ -543,11 +422,11 @@ def _built(target: Any, geometry: DeviceMesh, cell: wp.array, item: wp.array) ->
     view.brick = wp.empty(bricks, dtype=wp.int32, device=device)
     view.mask = wp.empty(max(occupied_count, 1), dtype=wp.uint64, device=device)
     view.block = wp.zeros(occupied_count * int(CELLS) + 1, dtype=wp.int32, device=device)
-    inputs = [start, number, first_block, view.brick, view.mask, view.block]
+    view.rows = wp.empty(block_count * int(LANES) * int(ROWS), dtype=wp.float32, device=device)
+    inputs = [start, number, first_block, view.brick, view.mask, view.block, view.rows]
     launch.launch(lay_out_bricks, bricks, inputs, device)
     view.leaps = wp.empty(8 * bricks, dtype=wp.uint8, device=device)
     launch.launch(find_leaps, 8, [view.brick, target.bricks, view.leaps], device)
-    view.rows = wp.zeros(block_count * int(LANES) * int(ROWS), dtype=wp.float32, device=device)
     view.triangle = wp.empty(block_count * int(LANES), dtype=wp.int32, device=device)
     inputs = [target, cell, item, places, start, number, view.block, view.rows, view.triangle]
     launch.launch(fill_records, cell.shape[0], inputs, device)

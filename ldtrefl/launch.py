@@ -9,8 +9,6 @@ that stays the same for every slicing, so the bits do not depend on the number o
 from __future__ import annotations
 
 import functools
-import itertools
-import operator
 import os
 import sys
 import tempfile
@@ -27,11 +25,13 @@ from ldtrefl.errors import InputError
 
 wp.config.log_level = wp.LOG_ERROR
 
-MIN_SLICE = 2048
-"""Items in a slice at least: a launch costs about 45 microseconds in Python, 2,048 rays a multiple of that."""
+SHORTEST_SLICE = 200e-6
+"""Seconds that a slice takes at least, going by the kernel's last launch: to wake a thread, or to pass on the
+interpreter lock, takes 50 to 100 microseconds."""
 
-SLICES_PER_THREAD = 4
-"""More slices than threads, so that a thread with cheap pixels takes over from one with dear pixels."""
+SHARE = 2
+"""A slice is this part of a thread's share of what is left: long ones first, which cost few launches, short ones at the
+end, so that all threads end together whatever their pixels cost."""
 
 KERNELS: list[wp.Kernel] = []
 """Every kernel defined so far. Each is a module of its own: it is compiled when it is first needed, and no sooner."""
@@ -46,6 +46,7 @@ class _State:
 
     threads: int = os.cpu_count() or 1
     pools: dict[int, ThreadPoolExecutor] = field(default_factory=dict)
+    seconds_per_item: dict[wp.Kernel, float] = field(default_factory=dict)  # of each kernel's last launch
     observer: Callable[[str, float], None] | None = None
     stage: str = ""
 
@@ -130,13 +131,29 @@ def launch(kernel: wp.Kernel, count: int, arguments: Sequence[Any], device: wp.D
         wp.launch(kernel, dim=count, inputs=[0, *arguments], device=device)
         return
     is_cut = _state.threads > 1 or _state.observer is not None
-    slices = min(_state.threads * SLICES_PER_THREAD, -(-count // MIN_SLICE)) if is_cut else 1
-    bounds = [count * i // slices for i in range(slices + 1)]
-    _run(
-        kernel,
-        device,
-        [(end - first, [first, *arguments]) for first, end in itertools.pairwise(bounds)],
-    )
+    slices = list(_slices(count, _shortest_slice(kernel))) if is_cut else [(0, count)]
+    _run(kernel, device, arguments, slices)
+
+
+def _shortest_slice(kernel: wp.Kernel) -> int:
+    """Items in a slice at least; 1 where nothing is known of the kernel yet."""
+    return max(1, int(SHORTEST_SLICE / _state.seconds_per_item.get(kernel, SHORTEST_SLICE)))
+
+
+def _slices(count: int, least: int) -> Iterator[tuple[int, int]]:
+    """(first, items) of slices that become shorter towards the end."""
+    first = 0
+    while first < count:
+        items = max(least, (count - first) // (SHARE * _state.threads))
+        # A rest shorter than a slice goes with the last one.
+        items = items if first + items + least <= count else count - first
+        yield first, items
+        first += items
+
+
+def part_count(kernel: wp.Kernel, count: int, device: wp.Device) -> int:
+    """Parts for :func:`launch_parts`: one a thread; one where that would take longer, and on CUDA."""
+    return _state.threads if device.is_cpu and count >= 2 * _shortest_slice(kernel) else 1
 
 
 def launch_parts(kernel: wp.Kernel, count: int, arguments: Sequence[Any], device: wp.Device, parts: int = 0) -> None:
@@ -144,47 +161,50 @@ def launch_parts(kernel: wp.Kernel, count: int, arguments: Sequence[Any], device
 
     For kernels whose items share memory: item ``i`` of part ``p`` may write only what belongs to ``p``. Inside a part
     the CPU goes through the items in order, alone; CUDA runs them at once, so such kernels use atomics all the same
-    (Warp's atomics are plain additions on the CPU). ``parts = 0`` lets the device choose: one a thread, one on CUDA.
+    (Warp's atomics are plain additions on the CPU). ``parts = 0`` means one a thread; CUDA has one part in any case.
     """
     if count <= 0:
         return
-    parts = parts or (_state.threads if device.is_cpu else 1)
     if not device.is_cpu:
-        for part in range(parts):
-            wp.launch(kernel, dim=count, inputs=[part, parts, *arguments], device=device)
+        wp.launch(kernel, dim=count, inputs=[0, 1, *arguments], device=device)
         return
-    _run(kernel, device, [(count, [part, parts, *arguments]) for part in range(parts)])
+    parts = parts or _state.threads
+    _run(kernel, device, [parts, *arguments], [(part, count) for part in range(parts)])
 
 
-def _run(kernel: wp.Kernel, device: wp.Device, slices: list[tuple[int, list[Any]]]) -> None:
-    """Work off the slices, (items, arguments) each, that differ in their first argument alone."""
+def _run(kernel: wp.Kernel, device: wp.Device, arguments: Sequence[Any], slices: list[tuple[int, int]]) -> None:
+    """Work off the slices: (first argument, items) each."""
     # Recording loads the kernel's module, which is not safe from several threads: once here, before any other starts.
-    count, arguments = slices[0]
-    command = wp.launch(kernel, dim=count, inputs=arguments, device=device, record_cmd=True)
+    first, items = slices[0]
+    command = wp.launch(kernel, dim=items, inputs=[first, *arguments], device=device, record_cmd=True)
     waiting = iter(slices[1:])  # taken from by all threads, one slice at a time
     workers = min(_state.threads, len(slices)) - 1
-    helpers = [_pool().submit(_work, kernel, device, waiting) for _ in range(workers)]
+    helpers = [_pool().submit(_work, kernel, device, arguments, waiting) for _ in range(workers)]
+    start, done = time.perf_counter(), items
     command.launch()
-    for count, arguments in waiting:
-        _report(1.0 - operator.length_hint(waiting) / len(slices))
-        command.set_dim(count)
-        command.set_param_at_index(0, arguments[0])
-        command.launch()
+    for first, items in waiting:
+        _report(first / (slices[-1][0] + 1))
+        _relaunch(command, first, items)
+        done += items
+    _state.seconds_per_item[kernel] = (time.perf_counter() - start) / done
     for helper in helpers:
         helper.result()
     _report(1.0)
 
 
-def _work(kernel: wp.Kernel, device: wp.Device, waiting: Iterator[tuple[int, list[Any]]]) -> None:
+def _work(kernel: wp.Kernel, device: wp.Device, arguments: Sequence[Any], waiting: Iterator[tuple[int, int]]) -> None:
     """Launch slices until none waits. The arguments are packed once, which takes ten times a launch."""
     command = None
-    for count, arguments in waiting:
+    for first, items in waiting:
         if command is None:
-            command = wp.launch(kernel, dim=count, inputs=arguments, device=device, record_cmd=True)
-        else:
-            command.set_dim(count)
-            command.set_param_at_index(0, arguments[0])
-        command.launch()
+            command = wp.launch(kernel, dim=items, inputs=[first, *arguments], device=device, record_cmd=True)
+        _relaunch(command, first, items)
+
+
+def _relaunch(command: wp.Launch, first: int, items: int) -> None:
+    command.set_dim(items)
+    command.set_param_at_index(0, first)
+    command.launch()
 
 
 def _pool() -> ThreadPoolExecutor:

@@ -95,6 +95,12 @@ class LayeredDepthTexture:
         return self._rasteriser.count
 
     @property
+    def record_count(self) -> int:
+        """Fragments in the maps and records in the grid, of what is made so far."""
+        fragments = self.fragment_count if "_maps" in self.__dict__ else 0
+        return fragments + (self.grid.records if "grid" in self.__dict__ else 0)
+
+    @property
     def nbytes(self) -> int:
         """Bytes that the maps and the grid take so far, the mesh not counted."""
         maps = sum(array.size * 4 for array in self._maps) if "_maps" in self.__dict__ else 0

@@ -37,6 +37,12 @@ CELL_SLACK = wp.constant(1.0e-4)
 EDGE_SLACK = wp.constant(1.0e-5)
 """Barycentric units by which records are widened, so that no ray slips between two triangles that share an edge."""
 
+GRAZING = wp.constant(0.35)
+"""n . direction below which a hit on the back of a closed object's patch is doubted, see ``is_past_horizon``."""
+
+HORIZON = wp.constant(0.1)
+"""Cells after a doubted hit from where the search goes on: a third of a patch."""
+
 NEGLIGIBLE = wp.constant(1.0e-18)
 """Component of a unit direction below which the ray runs along the planes: it would cross a cell in 1e18 cells."""
 
@@ -272,8 +278,8 @@ def march_exact(
 ) -> GridHit:
     """Walk the occupied cells along a ray, nearest first; the first record met is the answer.
 
-    Object ``index``, cell space, ``direction`` of unit length. All indices
-    are stepped as integers and every plane's t is computed from its index, so nothing adds up and nothing stalls.
+    Object ``index``, cell space, ``direction`` of unit length. All indices are stepped as
+    integers and every plane's t is computed from its index, so nothing adds up and nothing stalls.
     """
     found = GridHit()
     found.t = float(wp.inf)
@@ -427,19 +433,52 @@ def record_coordinates(views: wp.array(dtype=GridView), index: int, found: GridH
 
 
 @wp.func
+def record_normal(views: wp.array(dtype=GridView), index: int, fragment: int) -> wp.vec3:
+    """Unit normal of a record."""
+    row = LANES * ROWS * (fragment / LANES) + fragment % LANES
+    return wp.vec3(views[index].rows[row], views[index].rows[row + LANES], views[index].rows[row + 2 * LANES])
+
+
+@wp.func
+def is_past_horizon(
+    views: wp.array(dtype=GridView), index: int, origin: wp.vec3, direction: wp.vec3, found: GridHit
+) -> bool:
+    """Whether a hit is on a patch that sticks out past a silhouette, by its margin, and is met from behind.
+
+    From outside a closed object only the front of its surface is seen. A ray that grazes a back has either passed just
+    over the horizon or started inside; then any other ray from there meets a back too. (A part that is wound the wrong
+    way, in an object that is closed all the same, is seen but for its silhouette.)
+    """
+    if found.fragment < 0 or views[index].front == 0.0:
+        return False
+    normal = record_normal(views, index, found.fragment)
+    back = views[index].front * wp.dot(normal, direction)
+    if back <= 0.0 or back >= GRAZING:
+        return False
+    way = wp.normalize(wp.cross(direction, normal))
+    probe = march_exact(views, index, origin, way, FAR)
+    return probe.fragment < 0 or views[index].front * wp.dot(record_normal(views, index, probe.fragment), way) < 0.0
+
+
+@wp.func
 def closest_hit_exact(
     views: wp.array(dtype=GridView), index: int, origin: wp.vec3, direction: wp.vec3, t_max: float
 ) -> Hit:
     """The tracer's ``closest_hit`` by :func:`march_exact`."""
     scale = views[index].cells_per_unit
     hit = no_hit()
-    found = march_exact(views, index, scale * origin + views[index].cell_offset, direction, scale * t_max)
+    start = scale * origin + views[index].cell_offset
+    found = march_exact(views, index, start, direction, scale * t_max)
+    passed = float(0.0)
+    while is_past_horizon(views, index, start, direction, found):
+        passed += found.t + HORIZON
+        start += (found.t + HORIZON) * direction
+        found = march_exact(views, index, start, direction, scale * t_max - passed)
     hit.steps = found.steps
     if found.fragment >= 0:
-        hit.t = found.t / scale
+        hit.t = (passed + found.t) / scale
         hit.triangle = views[index].triangle[found.fragment]
-        row = LANES * ROWS * (found.fragment / LANES) + found.fragment % LANES
-        hit.normal = wp.vec3(views[index].rows[row], views[index].rows[row + LANES], views[index].rows[row + 2 * LANES])
+        hit.normal = record_normal(views, index, found.fragment)
         uv = record_coordinates(views, index, found, origin + hit.t * direction)
         hit.u = uv[0]
         hit.v = uv[1]

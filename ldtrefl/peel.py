@@ -23,7 +23,7 @@ from ldtrefl.binning import bin_items, exclusive_scan
 from ldtrefl.cubemap import TexelFrame
 from ldtrefl.device_scene import DeviceMesh
 from ldtrefl.errors import InputError
-from ldtrefl.raster import FixedTriangle, cover, fixed_triangle, interpolate, snap
+from ldtrefl.raster import FixedTriangle, cover, fixed_triangle, interpolate, snap, unsnap
 
 INSERTION_LIMIT = wp.constant(24)
 """Fragments in a texel up to which insertion sort beats heap sort."""
@@ -33,11 +33,19 @@ INSERTION_LIMIT = wp.constant(24)
 class PeelTarget:
     """The mesh in the box of texels that it is peeled into."""
 
-    fixed: wp.array(dtype=wp.vec3i)  # vertices in fixed-point texels
-    texel: wp.array(dtype=wp.vec3)  # vertices in texels
+    fixed: wp.array(dtype=wp.vec4i)  # vertices in fixed-point texels, and a hash of their place
     faces: wp.array(dtype=wp.vec3i)
     size: wp.vec3i
     first_texel: wp.vec3i
+
+
+@wp.func
+def place_hash(x: int, y: int, z: int) -> int:
+    """32 well-mixed bits that are the same for vertices in one place."""
+    h = wp.uint32(x) * wp.uint32(0x9E3779B1) + wp.uint32(y) * wp.uint32(0x85EBCA77) + wp.uint32(z)
+    h = (h ^ (h >> wp.uint32(15))) * wp.uint32(0x2C1B3C6D)
+    h = (h ^ (h >> wp.uint32(12))) * wp.uint32(0x297A2D39)
+    return int(h ^ (h >> wp.uint32(15)))
 
 
 @launch.kernel
@@ -48,17 +56,16 @@ def snap_vertices(
     scale: float,
     offset: wp.vec3,
     # Out:
-    texel_out: wp.array(dtype=wp.vec3),
-    fixed_out: wp.array(dtype=wp.vec3i),
+    fixed_out: wp.array(dtype=wp.vec4i),
 ):
     i = first + wp.tid()
     p = scale * vertices[i] + offset
-    texel_out[i] = p
-    fixed_out[i] = wp.vec3i(int(snap(p[0])), int(snap(p[1])), int(snap(p[2])))
+    x, y, z = int(snap(p[0])), int(snap(p[1])), int(snap(p[2]))
+    fixed_out[i] = wp.vec4i(x, y, z, place_hash(x, y, z))
 
 
 @wp.func
-def projected(target: PeelTarget, a: wp.vec3i, b: wp.vec3i, c: wp.vec3i, axis: int) -> FixedTriangle:
+def projected(target: PeelTarget, a: wp.vec4i, b: wp.vec4i, c: wp.vec4i, axis: int) -> FixedTriangle:
     """A triangle in the map of ``axis``."""
     u, v = (axis + 1) % 3, (axis + 2) % 3
     return fixed_triangle(a[u], a[v], b[u], b[v], c[u], c[v], target.size[u], target.size[v])
@@ -106,16 +113,13 @@ def fill_fragments(
     for axis in range(3):
         tri = projected(target, a, b, c, axis)
         if tri.area != wp.int64(0):
-            depth_a = target.texel[corners[0]][axis]
-            depth_b = target.texel[corners[1]][axis]
-            depth_c = target.texel[corners[2]][axis]
             columns = target.size[(axis + 1) % 3]
             for v in range(tri.first_v, tri.last_v + 1):
                 for u in range(tri.first_u, tri.last_u + 1):
                     at = cover(tri, u, v)
                     if at.covered:
                         texel_out[place] = target.first_texel[axis] + v * columns + u
-                        depth_out[place] = interpolate(tri, at, depth_a, depth_b, depth_c)
+                        depth_out[place] = interpolate(tri, at, unsnap(a[axis]), unsnap(b[axis]), unsnap(c[axis]))
                         # Counter-clockwise in (u, v) is a normal up the axis.
                         reference_out[place] = 2 * triangle + 1 - tri.flipped
                         place += 1
@@ -231,20 +235,25 @@ class Fragments:
     """int32: triangle times 2, plus 1 if it faces up the axis."""
 
 
+def snapped_vertices(geometry: DeviceMesh, frame: TexelFrame) -> wp.array:
+    """(vertices,) vec4i: x, y, z in fixed-point texels, and a hash of them."""
+    device, count = geometry.vertices.device, len(geometry.vertices)
+    fixed = wp.empty(count, dtype=wp.vec4i, device=device)
+    inputs: list[Any] = [geometry.vertices, frame.scale, wp.vec3(*frame.offset)]
+    launch.launch(snap_vertices, count, [*inputs, fixed], device)
+    return fixed
+
+
 class Rasteriser:
     """A mesh in its box of texels: counts its fragments, then makes them."""
 
     def __init__(self, geometry: DeviceMesh, frame: TexelFrame) -> None:
         self._frame, self._device = frame, geometry.vertices.device
         self._triangles = len(geometry.faces)
-        vertices = len(geometry.vertices)
         self._target = PeelTarget()
-        self._target.texel = wp.empty(vertices, dtype=wp.vec3, device=self._device)
-        self._target.fixed = wp.empty(vertices, dtype=wp.vec3i, device=self._device)
+        self._target.fixed = snapped_vertices(geometry, frame)
         self._target.faces = geometry.faces
         self._target.size, self._target.first_texel = wp.vec3i(*frame.size), wp.vec3i(*frame.first_texels[:3])
-        inputs: list[Any] = [geometry.vertices, frame.scale, wp.vec3(*frame.offset)]
-        launch.launch(snap_vertices, vertices, [*inputs, self._target.texel, self._target.fixed], self._device)
         counts = wp.zeros(self._triangles + 1, dtype=wp.int32, device=self._device)
         launch.launch(count_fragments, self._triangles, [self._target, counts], self._device)
         total = int(counts.numpy().sum(dtype=np.int64))

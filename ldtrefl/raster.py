@@ -5,9 +5,10 @@ rounding; texel centres on an edge go to one side by the top-left rule (a consis
 that share an edge therefore neither overlap nor leave a crack, and every texel centre inside the projection of a
 closed mesh is covered an even number of times, on any machine.
 
-*Perspective, homogeneous* (Olano and Greer 1997). The edge functions come from the corners' homogeneous pixel
-coordinates, so triangles that cross the camera's plane need no clipping. They are evaluated in float64 and the test
-is widened by their rounding, so that neighbours overlap by a hair rather than leave a crack; the depth test decides.
+*Perspective*: in the plane of the image where all corners lie in front of the camera and not far off; else homogeneous
+(Olano and Greer 1997): the edge functions come from the corners' homogeneous pixel coordinates, so triangles that cross
+the camera's plane need no clipping. Both are evaluated in float64 and the test is widened by their rounding, so that
+neighbours overlap by a hair rather than leave a crack; the depth test decides.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import warp as wp
 SUBTEXEL_BITS = wp.constant(16)
 """Fixed-point digits of a texel: finer than float32 at 256; 4096 texels fit in int32, their edge functions in int64."""
 SUBTEXELS = wp.constant(wp.float64(1 << SUBTEXEL_BITS))
+TEXEL_OF_SUBTEXEL = wp.constant(0.5**16)
 TEXEL = wp.constant(wp.int64(1 << SUBTEXEL_BITS))
 HALF_TEXEL_32 = wp.constant(1 << (SUBTEXEL_BITS - 1))
 HALF_TEXEL = wp.constant(wp.int64(1 << (SUBTEXEL_BITS - 1)))
@@ -47,6 +49,12 @@ class FixedTriangle:
 def snap(x: wp.float32) -> wp.int64:
     """The nearest fixed-point number."""
     return wp.int64(wp.floor(wp.float64(x) * SUBTEXELS + wp.float64(0.5)))
+
+
+@wp.func
+def unsnap(x: int) -> float:
+    """A fixed-point number in texels."""
+    return float(x) * TEXEL_OF_SUBTEXEL
 
 
 @wp.func
@@ -186,3 +194,25 @@ def perspective_weights(tri: HomogeneousTriangle, x: wp.float64, y: wp.float64) 
 def inverse_depth(tri: HomogeneousTriangle, weights: wp.vec3d) -> float:
     """1 / z at the pixel, positive in front of the camera."""
     return float((weights[0] + weights[1] + weights[2]) / wp.abs(tri.volume))
+
+
+@wp.func
+def planar_edge(a: wp.vec3d, b: wp.vec3d, x: wp.float64, y: wp.float64) -> wp.float64:
+    """Twice the signed area of (a, b, point), values within rounding of 0 taken to be 0."""
+    along, across = (b[0] - a[0]) * (y - a[1]), (b[1] - a[1]) * (x - a[0])
+    if wp.abs(along - across) < ROUNDING * (wp.abs(along) + wp.abs(across)):
+        return wp.float64(0.0)
+    return along - across
+
+
+@wp.func
+def planar_nearness(a: wp.vec3d, b: wp.vec3d, c: wp.vec3d, x: wp.float64, y: wp.float64) -> float:
+    """1 / depth at a pixel, from corners (x, y, 1 / depth) that all lie in front of the camera; 0 outside."""
+    at_a, at_b, at_c = planar_edge(b, c, x, y), planar_edge(c, a, x, y), planar_edge(a, b, x, y)
+    zero = wp.float64(0.0)
+    area = at_a + at_b + at_c
+    if wp.min(at_a, wp.min(at_b, at_c)) < zero and wp.max(at_a, wp.max(at_b, at_c)) > zero:
+        return 0.0
+    if area == zero:
+        return 0.0
+    return float((at_a * a[2] + at_b * b[2] + at_c * c[2]) / area)

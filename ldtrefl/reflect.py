@@ -217,6 +217,7 @@ def shade_pixels_kernel(tracer: Tracer) -> wp.Kernel:
     ):
         i = first + wp.tid()
         index = gbuffer.object[i]
+        mirror_out[i] = wp.vec3(0.0)
         if index < 0:
             x, y = float(i % gbuffer.camera.width) + 0.5, float(i / gbuffer.camera.width) + 0.5
             radiance_out[i] = environment_radiance(lighting, wp.normalize(camera_ray(gbuffer.camera, x, y)))
@@ -307,14 +308,35 @@ def start_rays(
 
 @dataclass(frozen=True, eq=False)
 class FirstHits:
-    """Where the rays of the first reflection end, per pixel of the image."""
+    """Where the rays of the first reflection end, per pixel of the image; each picture is made when it is asked for."""
 
-    distance: np.ndarray
-    """(h, w) float32 world units along the ray; +inf on a miss and outside the reflectors."""
-    object: np.ndarray
-    """(h, w) int32; -1 on a miss and outside the reflectors."""
-    triangle: np.ndarray
-    """(h, w) int32; -1 on a miss and outside the reflectors."""
+    shape: tuple[int, int]
+    """(h, w) of the image."""
+    rays: Any
+    """A ``RayBuffer``: of each ray the pixel."""
+    ends: Any
+    """The ``HitBuffer`` of the first bounce."""
+    device_units_per_world_unit: float
+
+    @functools.cached_property
+    def distance(self) -> np.ndarray:
+        """(h, w) float32 world units along the ray; +inf on a miss and outside the reflectors."""
+        return self._picture(self.ends.t, np.inf) / np.float32(self.device_units_per_world_unit)
+
+    @functools.cached_property
+    def object(self) -> np.ndarray:
+        """(h, w) int32; -1 on a miss and outside the reflectors."""
+        return self._picture(self.ends.object, -1)
+
+    @functools.cached_property
+    def triangle(self) -> np.ndarray:
+        """(h, w) int32; -1 on a miss and outside the reflectors."""
+        return self._picture(self.ends.triangle, -1)
+
+    def _picture(self, values: wp.array, fill: float) -> np.ndarray:
+        picture = np.full(self.shape[0] * self.shape[1], fill, values.numpy().dtype)
+        picture[self.rays.pixel.numpy()] = values.numpy()
+        return picture.reshape(self.shape)
 
 
 def mirror_rays(gbuffer: GBuffer, regions: ReflectionRegions | None) -> Any:
@@ -354,20 +376,19 @@ def follow_rays(
         rays = mirror_rays(gbuffer, regions)
     n = rays.pixel.shape[0]
     stats.count("rays", n)
-    hits = HitBuffer()
-    hits.t = wp.empty(n, dtype=float, device=device)
-    hits.object, hits.triangle, hits.steps = (wp.empty(n, dtype=wp.int32, device=device) for _ in range(3))
-    hits.barycentrics = wp.empty(n, dtype=wp.vec2, device=device)
     radiance = wp.zeros(gbuffer.pixel_count, dtype=wp.vec3, device=device)
     shadow = bound if shadows else no_shadows(device)
     first_hits = None
     for bounce in range(max_bounces):
         with stats.stage("march", device):
+            if bounce < 2:  # the first bounce's are kept
+                hits = _hit_buffer(n, device)
             inputs = [rays, scene.records, bound.views, bits, hits]
             launch.launch(closest_hits_kernel(bound.tracer), n, inputs, device)
             stats.count("steps", int(hits.steps.numpy().sum(dtype=np.int64)))
         if first_hits is None:
-            first_hits = _first_hits(gbuffer, rays.pixel.numpy(), hits)
+            shape = (gbuffer.camera.height, gbuffer.camera.width)
+            first_hits = FirstHits(shape, rays, hits, scene.device_units_per_world_unit)
         with stats.stage("shade", device):
             is_last = int(bounce + 1 == max_bounces)
             inputs = [hits, scene.records, scene.lighting, shadow.views, is_last, rays, radiance]
@@ -380,21 +401,19 @@ def follow_rays(
     return radiance, first_hits
 
 
-def _first_hits(gbuffer: GBuffer, pixels: np.ndarray, hits: Any) -> FirstHits:
-    def image(values: wp.array, fill: float) -> np.ndarray:
-        picture = np.full(gbuffer.pixel_count, fill, values.numpy().dtype)
-        picture[pixels] = values.numpy()
-        return picture.reshape(gbuffer.camera.height, gbuffer.camera.width)
-
-    distance = image(hits.t, np.inf) / np.float32(gbuffer.scene.device_units_per_world_unit)
-    return FirstHits(distance, image(hits.object, -1), image(hits.triangle, -1))
+def _hit_buffer(n: int, device: wp.Device) -> Any:
+    hits = HitBuffer()
+    hits.t = wp.empty(n, dtype=float, device=device)
+    hits.object, hits.triangle, hits.steps = (wp.empty(n, dtype=wp.int32, device=device) for _ in range(3))
+    hits.barycentrics = wp.empty(n, dtype=wp.vec2, device=device)
+    return hits
 
 
 def shade_gbuffer(gbuffer: GBuffer, shadow: BoundTracer) -> tuple[wp.array, wp.array]:
     """(radiance without reflections, specular reflectance) of every pixel, (h * w,) vec3 each."""
     scene: DeviceScene = gbuffer.scene
     radiance = wp.empty(gbuffer.pixel_count, dtype=wp.vec3, device=scene.device)
-    mirror = wp.zeros(gbuffer.pixel_count, dtype=wp.vec3, device=scene.device)
+    mirror = wp.empty(gbuffer.pixel_count, dtype=wp.vec3, device=scene.device)
     inputs = [gbuffer.view, scene.records, scene.lighting, shadow.views, radiance, mirror]
     launch.launch(shade_pixels_kernel(shadow.tracer), gbuffer.pixel_count, inputs, scene.device)
     return radiance, mirror

@@ -54,6 +54,28 @@ def test_dense_meshes_become_patches(quality: str, wrong_hits: float, wrong_miss
     assert found["p99"] <= p99, found
 
 
+def rays_from_outside(count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Rays from a sphere about the unit cube through it."""
+    rng = np.random.default_rng(seed)
+    origins = rng.normal(size=(count, 3))
+    origins *= 3 / np.linalg.norm(origins, axis=1, keepdims=True)
+    return origins.astype(np.float32), (rng.uniform(-1, 1, (count, 3)) - origins).astype(np.float32)
+
+
+@pytest.mark.parametrize("wound", ["outwards", "inwards", "open"])
+def test_patches_show_their_front(wound: str) -> None:
+    """From outside a closed object no ray may end on the inside of its far wall or behind its horizon."""
+    mesh = shapes.make("torus_knot", DENSE_KNOT)
+    faces = {"outwards": mesh.faces, "inwards": mesh.faces[:, ::-1], "open": mesh.faces[:-1]}[wound]
+    maps = ldtrefl.peel(mesh.vertices, faces)
+    assert maps.grid.view.front == {"outwards": 1, "inwards": -1, "open": 0}[wound]
+    origins, directions = rays_from_outside(100_000, 7)
+    hits = maps.trace(origins, directions)
+    out = (hits.normal * directions).sum(axis=1) * (-1 if wound == "inwards" else 1)
+    back = (out > 0).sum() / (hits.triangle >= 0).sum()
+    assert back <= (1e-3 if wound == "open" else 1e-4), back
+
+
 def test_patches_do_not_lose_what_is_thin_or_large() -> None:
     """A dense knot with wires far thinner than a texel and one large triangle: none of them may vanish."""
     knot, wires = shapes.make("torus_knot", DENSE_KNOT), shapes.make("wires", {"count": 3, "radius": 0.0004})

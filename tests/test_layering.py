@@ -26,6 +26,7 @@ BOTTOM_TO_TOP = (
     "binning",
     "peel",
     "grid",
+    "patches",
     "grid_build",
     "trace",
     "march",

@@ -34,7 +34,8 @@ def test_benchmark_writes_what_it_promises(tmp_path: Path) -> None:
     command = [sys.executable, str(ROOT / "tools" / "benchmark.py"), "--quick", "-o", str(tmp_path)]
     done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
-    plots = {"error_against_time.png", "time_against_triangles.png", "build_against_triangles.png"}
+    kinds = ("error_against_time", "time_against_triangles", "build_against_triangles", "bytes_against_triangles")
+    plots = {f"{kind}.png" for kind in kinds}
     assert {path.name for path in tmp_path.iterdir()} == plots | {"benchmark.json", "benchmark.md"}
     result = json.loads((tmp_path / "benchmark.json").read_text())
     assert {"machine", "meshes", "error_against_time", "stages", "scaling", "paper"} <= set(result)

@@ -164,6 +164,16 @@ def embree_scene(mesh: ldtrefl.Mesh) -> rtcore_scene.EmbreeScene:
     return scene
 
 
+def grown_by(make: Callable[[], Any]) -> int:
+    """Bytes by which this process grows when something is made whose size cannot be asked for; to a few pages."""
+    pages = [0, 0]
+    for i, job in enumerate((lambda: None, make)):
+        made = job()
+        pages[i] = int(Path("/proc/self/statm").read_text().split()[1])
+        del made
+    return max(pages[1] - pages[0], 0) * os.sysconf("SC_PAGE_SIZE")
+
+
 def errors_of(batch: Batch, truth_t: np.ndarray, truth_triangle: np.ndarray, sure: np.ndarray) -> dict[str, float]:
     """Wrong hits and misses in percent of true hits, distances in texels, same triangle in percent of common hits."""
     hit, true_hit = (batch.triangle.numpy() >= 0) & sure, (truth_triangle >= 0) & sure
@@ -244,7 +254,12 @@ def rays_on_mesh(name: str, mesh: ldtrefl.Mesh, o: np.ndarray, d: np.ndarray, ro
         "unsure": int((~sure).sum()),
         "milliseconds": times,
         "build_milliseconds": builds,
-        "bytes": {**{f"ldt {q}": m.nbytes for q, m in maps.items()}, "ldt linear": linear.nbytes},
+        "bytes": {
+            "bvh": grown_by(makers["bvh"]),
+            "embree": grown_by(makers["embree"]),
+            **{f"ldt {quality}": made.nbytes for quality, made in maps.items()},
+            "ldt linear": linear.nbytes,
+        },
         "errors": {n: errors_of(b, truth_t, truth_triangle, sure) for n, b in batches.items() if n != "bvh"},
     }
 
@@ -351,8 +366,17 @@ def _median_stages(frames: list[dict[str, float]]) -> dict[str, float]:
     return rows | {"total": 1000 * statistics.median(sum(frame.values()) for frame in frames)}
 
 
+@launch.kernel
+def spin(first: int, out: wp.array(dtype=float)):
+    i = first + wp.tid()
+    x = float(i)
+    for _ in range(200):
+        x = 1.0001 * x + 0.5
+    out[i] = x
+
+
 def thread_scaling(quick: bool, rounds: int) -> dict[str, Any]:
-    """Time with one thread over time with two, of peeling and of marching."""
+    """Time with one thread over time with two, of peeling, of marching, and of arithmetic alone: the machine's own."""
     device = launch.resolve_device(None)
     segments = (600, 80) if quick else (2000, 125)
     mesh = shapes.make("torus_knot", {"segments": list(segments)})
@@ -368,15 +392,16 @@ def thread_scaling(quick: bool, rounds: int) -> dict[str, Any]:
 
         return run
 
+    spun = wp.empty(100_000, dtype=float, device=device)
     jobs = {}
     for threads in (1, 2):
+        jobs[f"arithmetic {threads}"] = with_threads(threads, lambda: launch.launch(spin, 100_000, [spun], device))
         jobs[f"march {threads}"] = with_threads(threads, batch)
         jobs[f"peel {threads}"] = with_threads(threads, lambda: peel_mesh(geometry))
         jobs[f"peel linear {threads}"] = with_threads(threads, lambda: peel_mesh(geometry, search="linear"))
     times = timed_in_turn(jobs, rounds)
-    return {
-        name: times[f"{name} 1"]["median"] / times[f"{name} 2"]["median"] for name in ("march", "peel", "peel linear")
-    }
+    names = ("arithmetic", "march", "peel", "peel linear")
+    return {name: times[f"{name} 1"]["median"] / times[f"{name} 2"]["median"] for name in names}
 
 
 def paper_tables(quick: bool, rounds: int) -> dict[str, Any]:
@@ -435,13 +460,18 @@ def draw_plots(result: dict[str, Any], folder: Path) -> None:
     _save(figure, folder / "error_against_time.png")
 
     knots = [row for row in result["meshes"] if row["mesh"] in KNOTS]
+
+    def figure_of(entry: Any) -> float:
+        return entry["median"] if isinstance(entry, dict) else entry / 1e6
+
     for key, label, name in (
         ("milliseconds", "milliseconds for the rays of a frame, one thread", "time_against_triangles.png"),
         ("build_milliseconds", "milliseconds to build, one thread", "build_against_triangles.png"),
+        ("bytes", "megabytes beside the mesh", "bytes_against_triangles.png"),
     ):
         figure, axes = plt.subplots(figsize=(7, 5))
-        for tracer in ("bvh", "embree", "ldt balanced", "ldt exact", "ldt fast", "ldt linear"):
-            values = [row[key][tracer]["median"] for row in knots]
+        for tracer in knots[0][key]:
+            values = [figure_of(row[key][tracer]) for row in knots]
             axes.plot([row["triangles"] for row in knots], values, "o-", label=tracer, markersize=4)
         axes.set(xscale="log", yscale="log", xlabel="triangles", ylabel=label, title="Torus knot")
         axes.grid(True, which="both", alpha=0.3)
@@ -484,8 +514,8 @@ def reading(result: dict[str, Any]) -> str:
             f"{t['embree'] / t['ldt balanced']:.2f} |"
         )
     lines += ["", "## Build, one thread", "", "| mesh | Warp BVH | Embree | default | exact | linear | default MB | "]
-    lines[-1] += "rays to break even with BVH |"
-    lines += ["|" + "---|" * 8]
+    lines[-1] += "BVH, Embree MB | rays to break even with BVH |"
+    lines += ["|" + "---|" * 9]
     for row in result["meshes"]:
         b = {name: entry["median"] for name, entry in row["build_milliseconds"].items()}
         t = {name: entry["median"] / row["rays"] for name, entry in row["milliseconds"].items()}
@@ -493,7 +523,8 @@ def reading(result: dict[str, Any]) -> str:
         even = "0" if later <= 0 else f"{later / gain:.0f}" if gain > 0 else "never"
         lines.append(
             f"| {row['mesh']} | {b['bvh']:.1f} | {b['embree']:.1f} | {b['ldt balanced']:.1f} | {b['ldt exact']:.1f} | "
-            f"{b['ldt linear']:.1f} | {row['bytes']['ldt balanced'] / 1e6:.1f} | {even} |"
+            f"{b['ldt linear']:.1f} | {row['bytes']['ldt balanced'] / 1e6:.1f} | {row['bytes']['bvh'] / 1e6:.0f}, "
+            f"{row['bytes']['embree'] / 1e6:.0f} | {even} |"
         )
     lines += ["", "## A frame, by stage", ""]
     for name, stages in result["stages"].items():

@@ -72,7 +72,7 @@ class Ldt(Method):
                 if id(geometry) not in maps:
                     maps[id(geometry)] = peel_mesh(geometry, self.config.resolution, quality=quality, search=search)
                     stats.count("objects_peeled", 1)
-                    stats.count("fragments", maps[id(geometry)].fragment_count)
+                    stats.count("records", maps[id(geometry)].record_count)
                     stats.count("map_bytes", maps[id(geometry)].nbytes)
         tracer = TRACERS[search]
         steps = {"linear_steps": self.config.linear_steps, "binary_steps": self.config.binary_steps}
