@@ -38,7 +38,7 @@ EDGE_SLACK = wp.constant(1.0e-5)
 """Barycentric units by which records are widened, so that no ray slips between two triangles that share an edge."""
 
 GRAZING = wp.constant(0.35)
-"""n . direction below which a hit on the back of a closed object's patch is doubted, see ``is_past_horizon``."""
+"""n . direction below which a hit on the back of a closed object's patch is doubted, see ``search_grid``."""
 
 HORIZON = wp.constant(0.1)
 """Cells after a doubted hit from where the search goes on: a third of a patch."""
@@ -440,43 +440,65 @@ def record_normal(views: wp.array(dtype=GridView), index: int, fragment: int) ->
 
 
 @wp.func
-def is_past_horizon(
-    views: wp.array(dtype=GridView), index: int, origin: wp.vec3, direction: wp.vec3, found: GridHit
-) -> bool:
-    """Whether a hit is on a patch that sticks out past a silhouette, by its margin, and is met from behind.
+def facing(views: wp.array(dtype=GridView), index: int, direction: wp.vec3, found: GridHit) -> float:
+    """n . direction, the normal n pointing out of a closed object; 0 on a miss, or if the object is not closed."""
+    if found.fragment < 0:
+        return 0.0
+    return views[index].front * wp.dot(record_normal(views, index, found.fragment), direction)
+
+
+@wp.func
+def search_grid(
+    views: wp.array(dtype=GridView), index: int, origin: wp.vec3, direction: wp.vec3, t_max: float
+) -> GridHit:
+    """:func:`march_exact`, over the horizon where patches stick out past it.
 
     From outside a closed object only the front of its surface is seen. A ray that grazes a back has either passed just
-    over the horizon or started inside; then any other ray from there meets a back too. (A part that is wound the wrong
-    way, in an object that is closed all the same, is seen but for its silhouette.)
+    over the horizon, where the next patch sticks out by its margin, and goes on; or it started inside. Then any other
+    ray from there meets a back too: one is sent to see. (A part that is wound the wrong way, in an object that is
+    closed all the same, is seen but for its silhouette.)
     """
-    if found.fragment < 0 or views[index].front == 0.0:
-        return False
-    normal = record_normal(views, index, found.fragment)
-    back = views[index].front * wp.dot(normal, direction)
-    if back <= 0.0 or back >= GRAZING:
-        return False
-    way = wp.normalize(wp.cross(direction, normal))
-    probe = march_exact(views, index, origin, way, FAR)
-    return probe.fragment < 0 or views[index].front * wp.dot(record_normal(views, index, probe.fragment), way) < 0.0
+    found = GridHit()
+    start, way, limit = origin, direction, t_max
+    passed = float(0.0)
+    steps = int(0)
+    probing = bool(False)
+    searching = bool(True)
+    while searching:
+        searching = False
+        met = march_exact(views, index, start, way, limit)
+        steps += met.steps
+        back = facing(views, index, way, met)
+        if not probing:
+            found = met
+            found.t += passed
+            if back > 0.0 and back < GRAZING:
+                probing = True
+                way = wp.normalize(wp.cross(direction, record_normal(views, index, met.fragment)))
+                limit = FAR
+                searching = True
+        elif back <= 0.0:
+            probing = False
+            passed = found.t + HORIZON
+            start = origin + passed * direction
+            way = direction
+            limit = t_max - passed
+            searching = True
+    found.steps = steps
+    return found
 
 
 @wp.func
 def closest_hit_exact(
     views: wp.array(dtype=GridView), index: int, origin: wp.vec3, direction: wp.vec3, t_max: float
 ) -> Hit:
-    """The tracer's ``closest_hit`` by :func:`march_exact`."""
+    """The tracer's ``closest_hit`` by :func:`search_grid`."""
     scale = views[index].cells_per_unit
     hit = no_hit()
-    start = scale * origin + views[index].cell_offset
-    found = march_exact(views, index, start, direction, scale * t_max)
-    passed = float(0.0)
-    while is_past_horizon(views, index, start, direction, found):
-        passed += found.t + HORIZON
-        start += (found.t + HORIZON) * direction
-        found = march_exact(views, index, start, direction, scale * t_max - passed)
+    found = search_grid(views, index, scale * origin + views[index].cell_offset, direction, scale * t_max)
     hit.steps = found.steps
     if found.fragment >= 0:
-        hit.t = (passed + found.t) / scale
+        hit.t = found.t / scale
         hit.triangle = views[index].triangle[found.fragment]
         hit.normal = record_normal(views, index, found.fragment)
         uv = record_coordinates(views, index, found, origin + hit.t * direction)
