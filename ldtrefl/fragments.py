@@ -3,7 +3,7 @@
 Three maps, one per axis, stand in one row of texels. Texel ``i`` holds fragments ``start[i]`` to ``start[i + 1]``,
 sorted by depth along the axis; two fragments of one depth are sorted by triangle. A fragment is a depth (float32,
 texels) and a reference (int32): its triangle's number times 2, plus 1 if the triangle faces up the axis. Normal, UVs
-and colour are those of the triangle, at the mesh's resolution. Memory follows the fragments: 8 bytes each, and 4 for
+and colour are those of the triangle, at the mesh's resolution. Memory follows the fragments: 8 bytes each, and 5 for
 every texel.
 """
 
@@ -19,6 +19,7 @@ class LdtView:
     start: wp.array(dtype=wp.int32)
     depth: wp.array(dtype=wp.float32)
     reference: wp.array(dtype=wp.int32)
+    balanced: wp.array(dtype=wp.uint8)  # per texel: 1 if as many fragments face up as down
     size: wp.vec3i  # texels along x, y, z
     first_texel: wp.vec3i  # of each axis' map
     texels_per_unit: float  # texel = texels_per_unit * unit + texel_offset

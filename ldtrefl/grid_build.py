@@ -33,6 +33,8 @@ give 0.15% wrong hits and a tenth of a texel at the 99th percentile; 1 texel a t
 
 DENSE = 2.2
 """Small triangles per texel of surface from which patches stand for them: the maps are then the coarser picture."""
+FEW_TRIANGLES = 50_000
+"""Triangles up to which all are kept, however fine: they fit in the cache, and a thin object stays exact."""
 DENSE_TRIANGLES = 300_000
 """Triangles from which a grid that keeps them all has more cells."""
 
@@ -41,6 +43,8 @@ CELL_MARGIN = wp.constant(1.0e-3)
 PATCH_RISE = wp.vec3(0.1)
 """Cells, a third of a patch, by which the box is widened for patches that rise out of it where the surface bends.
 Without it one ray in ten thousand slipped under them to the far wall."""
+THINNEST = wp.constant(6.0e-7)
+"""Height, in unit space, below which a triangle has no area: it is ten roundings of its corners, its normal chance."""
 LARGEST_LEAP = wp.constant(250)
 """Bricks: what fits in a byte, and more than a grid has."""
 
@@ -321,11 +325,14 @@ def fill_records(
     corner = piece.corner - float(BRICK) * wp.vec3(float(x), float(y), float(z))
     normal = wp.cross(piece.edge_u, piece.edge_v)
     square = wp.dot(normal, normal)
-    if square > 0.0:
+    u, v, across = piece.edge_u, piece.edge_v, piece.edge_v - piece.edge_u
+    longest = wp.max(wp.dot(across, across), wp.max(wp.dot(u, u), wp.dot(v, v)))
+    thin = THINNEST * target.cells_per_unit
+    row = LANES * ROWS * at + lane
+    if square > thin * thin * longest:
         unit = normal / wp.sqrt(square)
-        along_u = wp.cross(piece.edge_v, normal) / square
-        along_v = wp.cross(normal, piece.edge_u) / square
-        row = LANES * ROWS * at + lane
+        along_u = wp.cross(v, normal) / square
+        along_v = wp.cross(normal, u) / square
         for k in range(3):
             rows_out[row + k * LANES] = unit[k]
             rows_out[row + (4 + k) * LANES] = along_u[k]
@@ -334,6 +341,9 @@ def fill_records(
         rows_out[row + 7 * LANES] = -wp.dot(along_u, corner)
         rows_out[row + 11 * LANES] = -wp.dot(along_v, corner)
         rows_out[row + 12 * LANES] = piece.kind
+    else:
+        for k in range(ROWS):
+            rows_out[row + k * LANES] = 0.0
 
 
 def build_grid(geometry: DeviceMesh, resolution: int, quality: Quality) -> Grid:
@@ -343,7 +353,7 @@ def build_grid(geometry: DeviceMesh, resolution: int, quality: Quality) -> Grid:
     the maps' texels, which then stand for them.
     """
     triangles = len(geometry.faces)
-    if quality != "exact":
+    if quality != "exact" and triangles > FEW_TRIANGLES:
         frame = texel_frame(geometry.mesh, max(1, round(resolution / PATCH_TEXELS[quality])))
         target, ratio = _target(geometry, frame, FAST_GRID_CELLS if quality == "fast" else GRID_CELLS)
         survey = Survey(geometry, frame, ratio, target.bricks)

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO as oiio
 
-from ldtrefl.errors import InputError
+from ldtrefl.errors import InputError, caught_stderr
 
 WRITABLE = (".png", ".exr")
 LINEAR_FORMATS = ("openexr", "hdr")
@@ -42,18 +42,19 @@ def load_image(path: str | Path) -> np.ndarray:
     path = Path(path)
     if not path.is_file():
         raise InputError(f"{path}: no such picture")
-    reader = oiio.ImageInput.open(str(path))
-    if reader is None:
-        oiio.geterror()
-        raise InputError(f"{path}: not a picture that can be read (EXR, HDR, PNG or JPEG)")
-    try:
-        spec = reader.spec()
-        if not 0 < spec.width * spec.height <= MAX_READ_PIXELS:
-            raise InputError(f"{path}: {spec.width} x {spec.height} pixels, at most {MAX_READ_PIXELS} allowed")
-        pixels = reader.read_image(oiio.FLOAT)
-        linear = reader.format_name() in LINEAR_FORMATS
-    finally:
-        reader.close()
+    with caught_stderr():  # the formats' own libraries print what they find
+        reader = oiio.ImageInput.open(str(path))
+        if reader is None:
+            oiio.geterror()
+            raise InputError(f"{path}: not a picture that can be read (EXR, HDR, PNG or JPEG)")
+        try:
+            spec = reader.spec()
+            if not 0 < spec.width * spec.height <= MAX_READ_PIXELS:
+                raise InputError(f"{path}: {spec.width} x {spec.height} pixels, at most {MAX_READ_PIXELS} allowed")
+            pixels = reader.read_image(oiio.FLOAT)
+            linear = reader.format_name() in LINEAR_FORMATS
+        finally:
+            reader.close()
     if pixels is None:
         raise InputError(f"{path}: the picture is cut off or damaged")
     pixels = np.asarray(pixels, np.float32).reshape(spec.height, spec.width, -1)

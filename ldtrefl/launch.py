@@ -10,8 +10,6 @@ from __future__ import annotations
 
 import functools
 import os
-import sys
-import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -21,7 +19,7 @@ from typing import Any
 
 import warp as wp
 
-from ldtrefl.errors import InputError
+from ldtrefl.errors import InputError, caught_stderr
 
 wp.config.log_level = wp.LOG_ERROR
 
@@ -82,21 +80,13 @@ def thread_count() -> int:
 @functools.cache
 def _start_warp() -> None:
     """Initialise Warp. Its native code warns of a missing CUDA driver on standard error, which is no news here."""
-    sys.stderr.flush()
-    kept = os.dup(2)
-    try:
-        with tempfile.TemporaryFile() as said:
-            os.dup2(said.fileno(), 2)
-            try:
-                wp.init()
-            finally:
-                os.dup2(kept, 2)
-            said.seek(0)
-            for line in said.read().splitlines(keepends=True):
-                if NO_DRIVER not in line:
-                    os.write(2, line)
-    finally:
-        os.close(kept)
+    with caught_stderr() as caught:
+        wp.init()
+        caught.seek(0)
+        said = caught.read()
+    for line in said.splitlines(keepends=True):
+        if NO_DRIVER not in line:
+            os.write(2, line)
 
 
 def resolve_device(name: str | None) -> wp.Device:

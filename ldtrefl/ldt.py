@@ -20,10 +20,10 @@ from ldtrefl.errors import InputError, first_fault, unknown_name
 from ldtrefl.fragments import LdtView
 from ldtrefl.grid import Grid
 from ldtrefl.grid_build import Quality, build_grid
-from ldtrefl.march import TRACERS
+from ldtrefl.march import GRAZING, TRACERS
 from ldtrefl.mesh import Mesh
-from ldtrefl.peel import Rasteriser, sort_fragments
-from ldtrefl.trace import Hits, trace_batch
+from ldtrefl.peel import Maps, Rasteriser, sort_fragments, sorted_maps
+from ldtrefl.trace import Hits, trace_batch, trace_rays
 
 FORMAT = 1
 """Of saved files; goes up when what they hold changes."""
@@ -39,6 +39,10 @@ LINEAR_STEPS = 512
 
 BINARY_STEPS = 8
 """Default of ``binary_steps``: a texel's step is halved to less than a hundredth."""
+
+RAYS_ALL_AROUND = 4096
+FEW_BACKS = 2
+"""Of so many rays so few may meet a back in a closed mesh that is wound one way: one in 100,000 slips through."""
 
 _RESOLUTION = TypeAdapter(Annotated[int, Field(strict=True, ge=1, le=4096)])
 _QUALITY = TypeAdapter(Quality)
@@ -61,28 +65,31 @@ class LayeredDepthTexture:
         return Rasteriser(self.geometry, self.frame)
 
     @functools.cached_property
-    def _maps(self) -> tuple[wp.array, wp.array, wp.array]:
+    def _maps(self) -> Maps:
         return sort_fragments(self.frame, self._rasteriser.fragments())
 
     @functools.cached_property
     def grid(self) -> Grid:
         """The occupancy grid that the exact search walks."""
-        return build_grid(self.geometry, self.resolution, self.quality)
+        made = build_grid(self.geometry, self.resolution, self.quality)
+        if made.view.front != 0.0 and _shows_backs(made):
+            made.view.front = 0.0
+        return made
 
     @property
     def start(self) -> wp.array:
         """(texels + 1,) int32: first fragment of each texel, the three axes' maps in a row."""
-        return self._maps[0]
+        return self._maps.start
 
     @property
     def depth(self) -> wp.array:
         """(fragments,) float32, texels along the map's axis, sorted in each texel."""
-        return self._maps[1]
+        return self._maps.depth
 
     @property
     def reference(self) -> wp.array:
         """(fragments,) int32: triangle times 2, plus 1 if it faces up the axis."""
-        return self._maps[2]
+        return self._maps.reference
 
     @property
     def resolution(self) -> int:
@@ -103,7 +110,7 @@ class LayeredDepthTexture:
     @property
     def nbytes(self) -> int:
         """Bytes that the maps and the grid take so far, the mesh not counted."""
-        maps = sum(array.size * 4 for array in self._maps) if "_maps" in self.__dict__ else 0
+        maps = self._maps.nbytes if "_maps" in self.__dict__ else 0
         return maps + (self.grid.nbytes if "grid" in self.__dict__ else 0)
 
     def counts(self, axis: int) -> np.ndarray:
@@ -143,7 +150,8 @@ class LayeredDepthTexture:
         if search == "exact":
             return self.grid.view
         view = LdtView()
-        view.start, view.depth, view.reference = self._maps
+        view.start, view.depth, view.reference = self._maps.start, self._maps.depth, self._maps.reference
+        view.balanced = self._maps.balanced
         view.size = wp.vec3i(*self.frame.size)
         view.first_texel = wp.vec3i(*self.frame.first_texels[:3])
         view.texels_per_unit = self.frame.scale
@@ -231,12 +239,33 @@ class LayeredDepthTexture:
             raise InputError(f"{path}: not a layered depth texture that can be read ({error})") from error
         _check(frame, start, depth, reference, len(mesh.faces), path)
         loaded = cls(DeviceMesh.upload(mesh, target), frame)
-        loaded._maps = (
+        loaded._maps = sorted_maps(
             wp.array(start, dtype=wp.int32, device=target),
             wp.array(depth, dtype=wp.float32, device=target),
             wp.array(reference, dtype=wp.int32, device=target),
         )
         return loaded
+
+
+def _shows_backs(grid: Grid) -> bool:
+    """Whether rays from all around meet backs of a surface that is closed as a whole: a part is wound the other way."""
+    device = grid.view.vertices.device
+    origins, directions = (wp.array(rays, dtype=wp.vec3, device=device) for rays in _rays_all_around())
+    views = wp.array([grid.view], dtype=TRACERS["exact"].view, device=device)
+    hits = trace_rays(TRACERS["exact"], views, (np.zeros(3), 1.0), origins, directions)
+    towards = (hits.normal.numpy() * directions.numpy()).sum(axis=1)
+    return int((grid.view.front * towards > GRAZING).sum()) > FEW_BACKS
+
+
+@functools.cache
+def _rays_all_around() -> tuple[np.ndarray, np.ndarray]:
+    """(n, 3) float32 origins on a sphere about the unit cube and unit directions into it."""
+    rng = np.random.default_rng(0)
+    origins = rng.normal(size=(RAYS_ALL_AROUND, 3))
+    origins *= 4.0 / np.linalg.norm(origins, axis=1, keepdims=True)
+    directions = rng.uniform(-1.0, 1.0, (RAYS_ALL_AROUND, 3)) - origins
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    return origins.astype(np.float32), directions.astype(np.float32)
 
 
 def _check(frame: TexelFrame, start: Any, depth: Any, reference: Any, triangles: int, path: Any) -> None:

@@ -214,9 +214,15 @@ def sort_texels(
     # In and out:
     depth: wp.array(dtype=wp.float32),
     reference: wp.array(dtype=wp.int32),
+    # Out:
+    balanced_out: wp.array(dtype=wp.uint8),
 ):
     texel = first + wp.tid()
     begin, end = start[texel], start[texel + 1]
+    rising = int(0)
+    for k in range(begin, end):
+        rising += reference[k] & 1
+    balanced_out[texel] = wp.uint8(wp.where(2 * rising == end - begin, 1, 0))
     if end - begin > INSERTION_LIMIT:
         heap_sort(depth, reference, begin, end)
     elif end - begin > 1:
@@ -270,11 +276,33 @@ class Rasteriser:
         return Fragments(texel, depth, reference)
 
 
-def sort_fragments(frame: TexelFrame, raw: Fragments) -> tuple[wp.array, wp.array, wp.array]:
-    """(start, depth, reference) with the fragments in their texels, each texel sorted."""
+@dataclass(frozen=True, eq=False)
+class Maps:
+    """The fragments in their texels, each texel sorted; see ``fragments.py``."""
+
+    start: wp.array
+    depth: wp.array
+    reference: wp.array
+    balanced: wp.array
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the four arrays."""
+        return 4 * (self.start.size + self.depth.size + self.reference.size) + self.balanced.size
+
+
+def sort_fragments(frame: TexelFrame, raw: Fragments) -> Maps:
+    """Put fragments into their texels and sort each texel."""
     texels, total, device = frame.first_texels[3], raw.texel.shape[0], raw.texel.device
     start, places = bin_items(raw.texel, texels, device)
     depth, reference = wp.empty_like(raw.depth), wp.empty_like(raw.reference)
     launch.launch(scatter_fragments, total, [places, raw.depth, raw.reference, depth, reference], device)
-    launch.launch(sort_texels, texels, [start, depth, reference], device)
-    return start, depth, reference
+    return sorted_maps(start, depth, reference)
+
+
+def sorted_maps(start: wp.array, depth: wp.array, reference: wp.array) -> Maps:
+    """Sort the fragments of each texel in place."""
+    texels = start.shape[0] - 1
+    balanced = wp.empty(texels, dtype=wp.uint8, device=start.device)
+    launch.launch(sort_texels, texels, [start, depth, reference, balanced], start.device)
+    return Maps(start, depth, reference, balanced)

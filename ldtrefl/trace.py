@@ -22,6 +22,9 @@ SHORTEST = wp.constant(1.0e-15)
 LONGEST = wp.constant(1.0e15)
 """Lengths of directions whose squares stay well inside float32's range."""
 
+NEAR = wp.constant(8.0)
+"""Distance from the middle of the unit cube beyond which a ray's way to it is taken in float64."""
+
 
 @wp.struct
 class Hit:
@@ -100,23 +103,32 @@ def batch_kernel(tracer: Tracer) -> wp.Kernel:
         i = first + wp.tid()
         origin = origins[i]
         direction = directions[i]
+        hit = no_hit()
+        normal = wp.vec3(0.0)
         length = wp.length(direction)
         if length < SHORTEST or length > LONGEST:
             # Its square may have left float32's range.
             largest = wp.max(wp.abs(direction[0]), wp.max(wp.abs(direction[1]), wp.abs(direction[2])))
             length = largest * wp.length(direction / largest)
-        hit = no_hit()
-        normal = wp.vec3(0.0)
         if wp.isfinite(origin) and wp.isfinite(length) and length > 0.0:
             # Shift and scale in float64: the object may be tiny and far from its origin.
-            start = wp.vec3(
-                float((wp.float64(origin[0]) - centre[0]) * per_half),
-                float((wp.float64(origin[1]) - centre[1]) * per_half),
-                float((wp.float64(origin[2]) - centre[2]) * per_half),
+            start = per_half * wp.vec3d(
+                wp.float64(origin[0]) - centre[0], wp.float64(origin[1]) - centre[1], wp.float64(origin[2]) - centre[2]
             )
-            hit = closest_hit(views, 0, start, direction / length, float(wp.inf))
+            near = wp.vec3(float(start[0]), float(start[1]), float(start[2]))
+            way = direction / length
+            skipped = wp.float64(0.0)
+            if wp.max(wp.abs(near)) > NEAR:
+                # So may the object be from the ray's start: come near in float64, too.
+                exact_way = wp.normalize(
+                    wp.vec3d(wp.float64(direction[0]), wp.float64(direction[1]), wp.float64(direction[2]))
+                )
+                skipped = wp.max(-wp.dot(start, exact_way) - wp.float64(NEAR), skipped)
+                start = start + skipped * exact_way
+                near = wp.vec3(float(start[0]), float(start[1]), float(start[2]))
+            hit = closest_hit(views, 0, near, way, float(wp.inf))
             if hit.triangle >= 0:
-                hit.t = float(wp.float64(hit.t) / (per_half * wp.float64(length)))
+                hit.t = float((wp.float64(hit.t) + skipped) / (per_half * wp.float64(length)))
                 normal = hit.normal
         else:
             invalid_out[i] = wp.uint8(1)
@@ -143,16 +155,24 @@ def trace_batch(tracer: Tracer, views: wp.array, geometry: DeviceMesh, origins: 
     starts, ways = (_ray_array(rays, name, device) for rays, name in ((origins, "origins"), (directions, "directions")))
     if starts.shape != ways.shape:
         raise InputError(f"{starts.shape[0]} origins for {ways.shape[0]} directions")
-    n = starts.shape[0]
-    centre, half = geometry.mesh.unit_frame
+    hits = trace_rays(tracer, views, geometry.mesh.unit_frame, starts, ways)
+    if as_warp:
+        return hits
+    return Hits(hits.t.numpy(), hits.normal.numpy(), hits.triangle.numpy(), hits.barycentrics.numpy(), hits.invalid)
+
+
+def trace_rays(
+    tracer: Tracer, views: wp.array, unit_frame: tuple[np.ndarray, float], origins: wp.array, directions: wp.array
+) -> Hits:
+    """:func:`trace_batch` for Warp arrays, with the ``unit_frame`` of the rays: (0, 1) if they are in unit space."""
+    n, device = origins.shape[0], origins.device
+    centre, half = unit_frame
     t, triangle = wp.empty(n, dtype=float, device=device), wp.empty(n, dtype=int, device=device)
     normal, barycentrics = wp.empty(n, dtype=wp.vec3, device=device), wp.empty(n, dtype=wp.vec2, device=device)
     invalid = wp.zeros(n, dtype=wp.uint8, device=device)
-    inputs = [views, wp.vec3d(*centre), wp.float64(1.0 / half), starts, ways]
+    inputs = [views, wp.vec3d(*centre), wp.float64(1.0 / half), origins, directions]
     launch.launch(batch_kernel(tracer), n, [*inputs, t, normal, triangle, barycentrics, invalid], device)
-    as_asked = (lambda array: array) if as_warp else (lambda array: array.numpy())
-    bad = int(invalid.numpy().sum())
-    return Hits(as_asked(t), as_asked(normal), as_asked(triangle), as_asked(barycentrics), bad)
+    return Hits(t, normal, triangle, barycentrics, int(invalid.numpy().sum()))
 
 
 def _ray_array(rays: Any, name: str, device: wp.Device) -> wp.array:

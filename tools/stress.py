@@ -1,0 +1,112 @@
+"""Numerical stability under stress: 13 cases, each against an answer that does not depend on what is tested.
+
+    python tools/stress.py                 # ten minutes; writes tools/results/stress.json and stress.md
+    python tools/stress.py --only fuzz     # one case, nothing written
+    python tools/stress.py --quick         # a minute or two, small counts
+
+Every search, every quality and the ray caster are held to limits that stand in the cases' files with their reasons.
+Exit status 1 if one is passed. Distances are in texels of a 256 map.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import json
+import os
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+
+from stress_cases.judge import Outcome, as_dict
+
+
+@dataclass(frozen=True)
+class Size:
+    """How much a case tries."""
+
+    rays: int
+    pictures: int
+    """Pixels along a picture's side, or a number of files, as the case says."""
+
+
+CASES: dict[str, tuple[Size, Size]] = {  # name of the module -> full and quick size
+    "place": (Size(4000, 96), Size(300, 32)),
+    "directions": (Size(4000, 0), Size(200, 0)),
+    "origins": (Size(3000, 0), Size(200, 0)),
+    "meshes": (Size(4000, 0), Size(300, 0)),
+    "contact": (Size(0, 96), Size(0, 32)),
+    "cameras": (Size(0, 64), Size(0, 24)),
+    "reflectors": (Size(0, 64), Size(0, 32)),
+    "parameters": (Size(2000, 0), Size(100, 0)),
+    "invariance": (Size(20_000, 96), Size(1000, 32)),
+    "motion": (Size(0, 128), Size(0, 48)),
+    "fuzz": (Size(10_000_000, 0), Size(100_000, 0)),
+    "files": (Size(0, 125), Size(0, 4)),
+    "kills": (Size(0, 64), Size(0, 16)),
+}
+
+
+def load(name: str) -> ModuleType:
+    """The module of a case."""
+    return importlib.import_module(f"stress_cases.{name}")
+
+
+def table(outcomes: list[Outcome], seconds: float) -> str:
+    """The outcomes in Markdown: a summary by case and tracer, then every row."""
+    lines = ["# Stress", "", f"{len(outcomes)} rows, {sum(not o.passed for o in outcomes)} beyond their limits, "]
+    lines[-1] += (
+        f"{sum(o.non_finite for o in outcomes)} non-finite values, {seconds:.0f} s. Distances in texels of 256."
+    )
+    lines += [
+        "",
+        "| case | what | by | tried | wrong hits | wrong misses | p99.9 | worst | explained within | defects | ",
+    ]
+    lines[-1] += "non-finite | s | limit |  |"
+    lines += ["|" + "---|" * 14]
+    for o in outcomes:
+        held = "" if o.passed else "**beyond**"
+        lines.append(
+            f"| {o.case} | {o.what} | {o.by} | {o.tried} | {o.wrong_hits} | {o.wrong_misses} | {o.p999:.3g} | "
+            f"{o.worst:.3g} | {o.radius:g} | {o.defects} | {o.non_finite} | {o.seconds:.1f} | {o.limit} | {held} |"
+        )
+    return "\n".join(lines) + "\n"
+
+
+def main() -> int:
+    """Run the cases and write the report."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="small counts")
+    parser.add_argument("--only", choices=CASES, action="append", help="this case alone; may be repeated")
+    folder = Path(__file__).parent / "results"
+    parser.add_argument("-o", "--output", type=Path, default=folder, help="folder to write to")
+    arguments = parser.parse_args()
+    outcomes: list[Outcome] = []
+    begin = time.perf_counter()
+    for name in arguments.only or CASES:
+        size = CASES[name][arguments.quick]
+        start = time.perf_counter()
+        made = load(name).run(size.rays, size.pictures)
+        failed = [o for o in made if not o.passed]
+        seconds = time.perf_counter() - start
+        tried = sum(o.tried for o in made)
+        print(f"{made[0].case}: {len(made)} rows, {tried} tried, {len(failed)} beyond, {seconds:.0f} s")
+        for o in failed:
+            wrong = f"{o.wrong_hits} + {o.wrong_misses} wrong, worst {o.worst:.3g}, {o.defects} defects"
+            print(f"    {o.what}, {o.by}: {wrong}")
+        sys.stdout.flush()
+        outcomes += made
+    if not arguments.only:
+        arguments.output.mkdir(parents=True, exist_ok=True)
+        report = json.dumps([as_dict(o) for o in outcomes], indent=1)
+        for path, text in (("stress.json", report), ("stress.md", table(outcomes, time.perf_counter() - begin))):
+            scratch = arguments.output / f".{path}.part"
+            scratch.write_text(text)
+            os.replace(scratch, arguments.output / path)
+    return 1 if any(not o.passed for o in outcomes) else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

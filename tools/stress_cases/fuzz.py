@@ -1,0 +1,181 @@
+"""Case 11: Hypothesis draws meshes, places, options and rays together; every disagreement is classified."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+from hypothesis import HealthCheck, Phase, given, seed, settings
+from hypothesis import strategies as st
+
+import ldtrefl
+from ldtrefl import shapes
+from ldtrefl.grid_build import Quality
+
+from .judge import Limit, Outcome, Truth, describe, judge, moved
+
+NAME = "11 fuzz"
+RAYS = (1000, 5000)
+"""Rays of an example, at least and at most."""
+
+SHAPES = (
+    "sphere",
+    "box",
+    "hollow_box",
+    "torus",
+    "torus_knot",
+    "genus3",
+    "gyroid",
+    "bowl",
+    "room",
+    "wires",
+    "plane",
+    "teapot",
+)
+SMALL = {"sphere": [24, 12], "torus": [24, 12], "torus_knot": [64, 8]}
+FUZZ = Limit(
+    radius=0.1, p999=0.1, why="any mesh, stretched up to 1:100, from inside, outside and on it: ten times case 4's"
+)
+BVH = Limit(radius=1.0, p999=0.1, why="Warp's tree also finds triangles whose area is a rounding of their corners")
+TRACERS = ("exact", "balanced", "fast", "linear", "bvh")
+
+
+@st.composite
+def meshes(draw: st.DrawFn) -> ldtrefl.Mesh:
+    """A shape, or triangles at random; some of them dropped, doubled or turned over; stretched and moved."""
+    generator = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    kind = draw(st.sampled_from((*SHAPES, "soup", "fan", "lattice", "dense")))
+    if kind == "soup":
+        corners = generator.uniform(-1, 1, (draw(st.integers(1, 400)), 1, 3))
+        vertices = corners + generator.normal(size=(len(corners), 3, 3)) * draw(st.sampled_from((1e-4, 1e-2, 1.0)))
+        mesh = ldtrefl.Mesh(vertices.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
+    elif kind == "fan":
+        around = np.linspace(0, 2 * np.pi, draw(st.integers(3, 200)))
+        rim = np.column_stack([np.cos(around), np.sin(around), 0.1 * np.cos(5 * around)])
+        n = len(rim)
+        mesh = ldtrefl.Mesh(np.vstack([rim, [[0, 0, 0.3]]]), np.array([[n, i, (i + 1) % n] for i in range(n)]))
+    elif kind == "lattice":
+        vertices = generator.integers(-3, 4, (60, 3)).astype(float)
+        mesh = ldtrefl.Mesh(vertices, generator.integers(0, 60, (200, 3)))
+    elif kind == "dense":
+        mesh = shapes.make("torus_knot", {"segments": [draw(st.integers(1200, 1600)), 100]})
+    else:
+        mesh = shapes.make(kind, {"segments": SMALL[kind]} if kind in SMALL else None)
+    faces = mesh.faces
+    if kind != "dense":
+        if draw(st.booleans()):
+            faces = faces[generator.random(len(faces)) < draw(st.floats(0.3, 1.0))]
+        if draw(st.booleans()):
+            faces = np.concatenate([faces, faces[: len(faces) // 3], faces[: len(faces) // 5, ::-1]])
+    faces = faces if len(faces) else mesh.faces
+    stretch = [10.0 ** draw(st.floats(-2, 0)) for _ in range(3)] if kind != "dense" else [1.0] * 3
+    turn, _ = np.linalg.qr(generator.normal(size=(3, 3)))
+    vertices = (mesh.vertices * stretch) @ (turn if draw(st.booleans()) else np.eye(3))
+    return moved(ldtrefl.Mesh(vertices, faces), 10.0 ** draw(st.floats(-6, 6)), 0.0)
+
+
+def rays_of_all_kinds(mesh: ldtrefl.Mesh, count: int, generator: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Rays from outside and from within the box, to points of the box, of the surface, and anywhere."""
+    centre, half = mesh.unit_frame
+    low, high = mesh.bounds
+    around = generator.normal(size=(count, 3))
+    around /= np.linalg.norm(around, axis=1, keepdims=True)
+    corners = mesh.vertices[mesh.faces[generator.integers(0, len(mesh.faces), count)]]
+    surface = (generator.dirichlet((1, 1, 1), count)[:, :, None] * corners).sum(axis=1)
+    box = generator.uniform(low, high, (count, 3))
+    kind = generator.integers(0, 8, count)[:, None]
+    origins = np.where(kind < 6, centre + half * 10.0 ** generator.uniform(0.2, 3, (count, 1)) * around, box)
+    targets = np.where(kind % 2 == 0, surface, generator.uniform(low, high, (count, 3)))
+    directions = np.where(kind == 5, generator.normal(size=(count, 3)) * half, targets - origins)
+    return origins.astype(np.float32), (directions / half).astype(np.float32)
+
+
+def run(rays: int, pictures: int) -> list[Outcome]:
+    """Examples until ``rays`` rays have been traced."""
+    totals = {by: Outcome(NAME, "meshes, places, options and rays", by) for by in TRACERS}
+    worst_p999: dict[str, list[float]] = {by: [] for by in TRACERS}
+    count = min(max(rays // 100, RAYS[0]), RAYS[1])
+    examples = max(1, rays // (count * len(TRACERS)))
+
+    @seed(11)
+    @settings(
+        max_examples=examples,
+        deadline=None,
+        database=None,
+        phases=[Phase.generate],
+        suppress_health_check=list(HealthCheck),
+    )
+    @given(
+        meshes(),
+        st.integers(0, 2**32 - 1),
+        st.sampled_from((16, 64, 256, 700)),
+    )
+    def example(mesh: ldtrefl.Mesh, number: int, resolution: int) -> None:
+        origins, directions = rays_of_all_kinds(mesh, count, np.random.default_rng(number))
+        truth = Truth(mesh)
+        # Embree first, brute force where it disagrees: a million rays against every triangle take minutes.
+        quick = Truth(mesh, always_embree=True)
+        true_t = quick.hits(origins, directions)
+        for by in TRACERS:
+            start = time.perf_counter()
+            if by == "bvh":
+                hits = ldtrefl.Raycaster(mesh.vertices, mesh.faces).trace(origins, directions)
+            else:
+                search = "linear" if by == "linear" else "exact"
+                chosen: Quality = "exact" if by == "linear" else by  # type: ignore[assignment]
+                maps = ldtrefl.peel(mesh.vertices, mesh.faces, resolution, quality=chosen, search=search)
+                hits = maps.trace(origins, directions, search=search)
+            if by != "linear":
+                true_t = corrected(truth, origins, directions, true_t, hits)
+            outcome = judge(truth, origins, directions, true_t, hits, limit_of(by, mesh))
+            total = totals[by]
+            total.tried += outcome.tried
+            total.wrong_hits += outcome.wrong_hits
+            total.wrong_misses += outcome.wrong_misses
+            total.worst = max(total.worst, outcome.worst)
+            worst_p999[by].append(outcome.p999)
+            total.radius = max(total.radius, outcome.radius)
+            total.defects += outcome.defects
+            total.non_finite += outcome.non_finite
+            total.seconds += time.perf_counter() - start
+            total.passed &= outcome.passed
+
+    example()
+    for by, total in totals.items():
+        total.p999 = float(np.median(worst_p999[by]))
+        total.limit = describe(limit_of(by, None))
+    return list(totals.values())
+
+
+def limit_of(by: str, mesh: ldtrefl.Mesh | None) -> Limit:
+    """What a tracer is held to on a mesh."""
+    if by == "linear":
+        return Limit(
+            p999=np.inf,
+            defects=False,
+            why="no limit but finite answers: resolutions from 16, stretched and thin meshes",
+        )
+    if mesh is not None and len(mesh.faces) > 50_000 and by in ("balanced", "fast"):
+        # A texel of the map may be 16 of the 256 that are counted in.
+        return Limit(
+            radius=np.inf, p999=np.inf, wrong=60.0 if by == "fast" else 25.0, why="patches of maps from 16 texels"
+        )
+    if by == "bvh":
+        return BVH
+    return FUZZ
+
+
+def corrected(
+    truth: Truth, origins: np.ndarray, directions: np.ndarray, true_t: np.ndarray, hits: ldtrefl.Hits
+) -> np.ndarray:
+    """The truth again, in float64, for the rays where a tracer and Embree disagree."""
+    texel = 2 * truth.half / 256
+    length = np.linalg.norm(directions.astype(float), axis=1)
+    with np.errstate(invalid="ignore"):
+        doubtful = np.isfinite(true_t) != (hits.triangle >= 0)
+        doubtful |= np.abs(true_t - hits.t) * length > 1e-3 * texel
+    rows = np.flatnonzero(doubtful)
+    if len(rows) and truth.is_brute:
+        true_t = true_t.copy()
+        true_t[rows] = truth.hits(origins[rows], directions[rows])
+    return true_t

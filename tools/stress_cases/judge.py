@@ -1,0 +1,319 @@
+"""What every case shares: answers that depend on no tracer of ours, and the classification of disagreements.
+
+The truth of a ray is float64 brute force (Moeller and Trumbore 1997, every triangle, NumPy); on meshes of more than
+``BRUTE_TRIANGLES`` it is Embree in robust mode. A disagreement (a hit too many, a hit too few, a hit elsewhere) is
+*explained* when the truth itself gives the tracer's answer for a ray moved aside by at most a *radius*: the ray passes
+within that radius of a silhouette or of a tie between coincident surfaces. What no radius within the limit explains is
+a defect. Distances and radii are in texels of a 256 map of the object, whatever the map's resolution.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+from embreex import rtcore_scene
+from embreex.mesh_construction import TriangleMesh
+
+import ldtrefl
+
+wp.config.log_level = wp.LOG_ERROR
+
+BRUTE_TRIANGLES = 4000
+"""Triangles up to which every ray is tested against every triangle."""
+
+TEXELS = 256
+"""Texels along an object's longest side that distances are given in."""
+
+RADII = (1e-3, 1e-2, 0.1, 0.3, 1.0, 3.0)
+"""Texels by which a ray is moved aside, smallest first, to explain a disagreement."""
+
+MOVED = 96
+"""Rays about one for each radius."""
+
+FLOAT32 = 1.2e-7
+"""Relative rounding of a float32, twice."""
+
+EXAMINED = 100
+"""Disagreements of a run that are examined at most, evenly spread."""
+
+
+@dataclass(frozen=True)
+class Limit:
+    """What a tracer is held to in a case."""
+
+    radius: float = 0.01
+    """Texels from a silhouette or a tie within which disagreements may lie."""
+    p999: float = 0.01
+    """Texels between the hit and the true one, 99.9th percentile."""
+    wrong: float = 100.0
+    """Percent of rays that may disagree at all."""
+    defects: bool = True
+    """Whether a disagreement beyond ``radius`` breaks the limit."""
+    slips: bool = False
+    """Whether any answer counts as explained within ``radius`` of a silhouette: between patches there may be a slit."""
+    why: str = ""
+
+
+EXACT = Limit(why="float32: a thousandth of a texel, and ten times that at grazing angles")
+LINEAR = Limit(
+    p999=np.inf,
+    wrong=10.0,
+    defects=False,
+    why="the paper's search steps over what is thin and sees texels as blocks: percent alone",
+)
+
+
+@dataclass
+class Outcome:
+    """What a case measured for one tracer."""
+
+    case: str
+    what: str
+    by: str
+    tried: int = 0
+    wrong_hits: int = 0
+    wrong_misses: int = 0
+    worst: float = 0.0
+    """Texels."""
+    p999: float = 0.0
+    """Texels."""
+    radius: float = 0.0
+    """Texels within which every disagreement is explained; infinite where one is not."""
+    defects: int = 0
+    non_finite: int = 0
+    seconds: float = 0.0
+    limit: str = ""
+    passed: bool = True
+
+
+def linear_limit(percent: float, why: str) -> Limit:
+    """The paper's search held to a share of wrong rays."""
+    return dataclasses.replace(LINEAR, wrong=percent, why=why)
+
+
+def limits(
+    exact: Limit = EXACT, balanced: Limit | None = None, fast: Limit | None = None, linear: Limit = LINEAR
+) -> dict[str, Limit]:
+    """Limits by tracer: where triangles are larger than texels all qualities are held to the exact one's."""
+    return {
+        "exact": exact,
+        "balanced": balanced or exact,
+        "fast": fast or balanced or exact,
+        "linear": linear,
+        "bvh": exact,
+    }
+
+
+DENSE = limits(
+    balanced=Limit(
+        radius=1.0, p999=1.0, slips=True, why="a patch is a plane of 1.6 texels: silhouettes move by up to half of one"
+    ),
+    fast=Limit(radius=3.0, p999=40.0, wrong=2.0, slips=True, why="a patch is a plane of 4 texels"),
+)
+"""Limits where triangles are smaller than texels and patches stand for them."""
+
+
+class Truth:
+    """First hits on a mesh, by brute force or by Embree."""
+
+    def __init__(self, mesh: ldtrefl.Mesh, *, always_embree: bool = False) -> None:
+        self.mesh = mesh
+        self.is_brute = not always_embree and len(mesh.faces) <= BRUTE_TRIANGLES
+        self.centre, self.half = mesh.unit_frame
+        corners = ((mesh.vertices - self.centre) / self.half)[mesh.faces]
+        self._a, self._u, self._v = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+        self._embree = None
+        if not self.is_brute:
+            self._embree = rtcore_scene.EmbreeScene(robust=True)
+            self._geometry = TriangleMesh(self._embree, mesh.unit_vertices, mesh.faces)
+
+    def hits(self, origins: np.ndarray, directions: np.ndarray) -> np.ndarray:
+        """(n,) float64 distances in lengths of each direction, +inf on a miss; origins and directions (n, 3)."""
+        return self.first_hits(origins, directions)[0]
+
+    def first_hits(self, origins: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The same, and (n,) triangles, -1 on a miss."""
+        o = (np.asarray(origins, float) - self.centre) / self.half
+        d = np.asarray(directions, float)
+        length = np.abs(d).max(axis=1, keepdims=True)
+        length = length * np.linalg.norm(d / length, axis=1, keepdims=True)
+        d = d / length
+        # Start near the object: a float32 ray tracer cannot start far away, and brute force loses nothing.
+        skipped = np.maximum(-(o * d).sum(axis=1) - 2.0, 0.0)
+        o = o + skipped[:, None] * d
+        t, triangle = self._by_embree(o, d) if self._embree is not None else self._by_force(o, d)
+        return (t + skipped) * self.half / length[:, 0], triangle
+
+    def _by_embree(self, o: np.ndarray, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        assert self._embree is not None
+        answer = self._embree.run(o.astype(np.float32), d.astype(np.float32), output=1)
+        triangle = answer["primID"].astype(int)
+        return np.where(triangle >= 0, answer["tfar"], np.inf).astype(float), triangle
+
+    def _by_force(self, o: np.ndarray, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        t, triangle = np.full(len(o), np.inf), np.full(len(o), -1)
+        step = max(1, 1_000_000 // len(self._a))
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            for first in range(0, len(o), step):
+                rays = slice(first, first + step)
+                p = np.cross(d[rays, None], self._v)
+                determinant = (p * self._u).sum(axis=2)
+                s = o[rays, None] - self._a
+                u = (s * p).sum(axis=2) / determinant
+                q = np.cross(s, self._u)
+                v = (q * d[rays, None]).sum(axis=2) / determinant
+                along = (q * self._v).sum(axis=2) / determinant
+                inside = (u >= 0) & (v >= 0) & (u + v <= 1) & (along >= 0) & np.isfinite(along)
+                along = np.where(inside, along, np.inf)
+                nearest = along.argmin(axis=1)
+                t[rays] = along[np.arange(len(nearest)), nearest]
+                triangle[rays] = np.where(np.isfinite(t[rays]), nearest, -1)
+        return t, triangle
+
+
+def tracers(mesh: ldtrefl.Mesh, resolution: int = TEXELS, **options: int) -> Iterator[tuple[str, Callable]]:
+    """(name, ``trace(origins, directions) -> Hits``) of every search, every quality and the BVH."""
+    for quality in ("exact", "balanced", "fast"):
+        yield quality, ldtrefl.peel(mesh.vertices, mesh.faces, resolution, quality=quality).trace
+    maps = ldtrefl.peel(mesh.vertices, mesh.faces, resolution, search="linear")
+    yield "linear", lambda o, d: maps.trace(o, d, search="linear", **options)
+    yield "bvh", ldtrefl.Raycaster(mesh.vertices, mesh.faces).trace
+
+
+def judge_mesh(
+    case: str,
+    what: str,
+    mesh: ldtrefl.Mesh,
+    origins: np.ndarray,
+    directions: np.ndarray,
+    held_to: dict[str, Limit] | None = None,
+    resolution: int = TEXELS,
+) -> list[Outcome]:
+    """Every tracer against the truth on the same rays."""
+    origins, directions = (np.ascontiguousarray(x, np.float32) for x in (origins, directions))
+    truth = Truth(mesh)
+    true_t = truth.hits(origins, directions)
+    outcomes = []
+    for by, trace in tracers(mesh, resolution):
+        start = time.perf_counter()
+        hits = trace(origins, directions)
+        outcome = judge(truth, origins, directions, true_t, hits, (held_to or limits())[by])
+        outcome.case, outcome.what, outcome.by = case, what, by
+        outcome.seconds = time.perf_counter() - start
+        outcomes.append(outcome)
+    return outcomes
+
+
+def judge(
+    truth: Truth, origins: np.ndarray, directions: np.ndarray, true_t: np.ndarray, hits: ldtrefl.Hits, limit: Limit
+) -> Outcome:
+    """One tracer's hits against the truth."""
+    texel = 2.0 * truth.half / TEXELS
+    t = np.asarray(hits.t, float)
+    hit, true = hits.triangle >= 0, np.isfinite(true_t)
+    broken = np.isnan(t) | (hit != np.isfinite(t)) | ~np.isfinite(hits.normal).all(axis=1)
+    broken |= ~np.isfinite(hits.barycentrics).all(axis=1) | (hits.triangle >= len(truth.mesh.faces))
+    both = hit & true
+    length = np.linalg.norm(directions.astype(float), axis=1)
+    error = np.zeros(len(t))
+    # The distance is a float32, which far away is coarser than a texel: its own rounding is no error.
+    off = np.abs(t[both] - true_t[both])
+    error[both] = np.maximum(off - FLOAT32 * true_t[both], 0.0) * length[both] / texel
+    worst_allowed = max(limit.p999, 0.05)
+    agree = both & (error <= worst_allowed)
+    disagree = np.flatnonzero((hit | true) & ~agree)
+    radius, defects = 0.0, 0
+    examined = min(len(disagree), EXAMINED) if limit.defects else 0
+    for i in disagree[np.linspace(0, len(disagree) - 1, examined).astype(int)]:
+        found = explaining_radius(truth, origins[i], directions[i], t[i], texel, limit.slips)
+        radius = max(radius, found)
+        defects += found > limit.radius
+    outcome = Outcome(
+        "",
+        "",
+        "",
+        tried=len(t),
+        wrong_hits=int((hit & ~true).sum()),
+        wrong_misses=int((true & ~hit).sum()),
+        worst=float(error[agree].max(initial=0.0)),
+        p999=float(np.percentile(error[agree], 99.9)) if agree.any() else 0.0,
+        radius=radius,
+        defects=defects,
+        non_finite=int(broken.sum()),
+        limit=describe(limit),
+    )
+    wrong = 100.0 * len(disagree) / max(len(t), 1)
+    outcome.passed = (
+        outcome.non_finite == 0
+        and outcome.p999 <= limit.p999
+        and wrong <= limit.wrong
+        and (defects == 0 or not limit.defects)
+    )
+    return outcome
+
+
+def explaining_radius(
+    truth: Truth, origin: np.ndarray, direction: np.ndarray, t: float, texel: float, slips: bool
+) -> float:
+    """The least of ``RADII`` by which the ray is moved aside for the truth to give ``t``; infinite if none is.
+
+    With ``slips`` it is enough that the truth jumps there, from hit to miss or to another distance.
+    """
+    rng = np.random.default_rng(0)
+    o, d = origin.astype(float), direction.astype(float)
+    length = np.linalg.norm(d)
+    # Aside, and so that far rays are moved aside where they meet the object, not at their start.
+    ways = rng.normal(size=(MOVED, 3))
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    for radius in RADII:
+        moved = np.sort(truth.hits(o + radius * texel * ways, np.broadcast_to(d, (MOVED, 3))))
+        with np.errstate(invalid="ignore"):
+            if slips and np.nan_to_num(np.diff(moved), nan=0.0).max() > 16 * radius * texel / length:
+                return radius
+        if not np.isfinite(t):
+            if not np.isfinite(moved).all():
+                return radius
+        else:
+            finite = moved[np.isfinite(moved)]
+            if len(finite):
+                # Half as far again as the moved rays' hits lie apart: at grazing angles they are few and far between.
+                slack = 4.0 * radius * texel / length + FLOAT32 * t + 0.5 * (finite.max() - finite.min())
+                if finite.min() - slack <= t <= finite.max() + slack:
+                    return radius
+    return np.inf
+
+
+def describe(limit: Limit) -> str:
+    """A limit in a few words."""
+    parts = [f"explained within {limit.radius:g} texels"] if limit.defects else []
+    parts += [f"p99.9 <= {limit.p999:g}"] if np.isfinite(limit.p999) else []
+    parts += [f"wrong <= {limit.wrong:g}%"] if limit.wrong < 100 else []
+    return ", ".join(parts) + (f" ({limit.why})" if limit.why else "")
+
+
+def rays_about(mesh: ldtrefl.Mesh, count: int, seed: int, reach: float = 2.5) -> tuple[np.ndarray, np.ndarray]:
+    """(count, 3) float32 origins on a sphere about the mesh and directions towards points of its box."""
+    rng = np.random.default_rng(seed)
+    centre, half = mesh.unit_frame
+    around = rng.normal(size=(count, 3))
+    around /= np.linalg.norm(around, axis=1, keepdims=True)
+    origins = (centre + reach * half * around).astype(np.float32)
+    targets = rng.uniform(mesh.bounds[0], mesh.bounds[1], (count, 3))
+    return origins, ((targets - origins) / (reach * half)).astype(np.float32)
+
+
+def moved(mesh: ldtrefl.Mesh, scale: object = 1.0, offset: object = 0.0) -> ldtrefl.Mesh:
+    """The mesh scaled and moved."""
+    return ldtrefl.Mesh(mesh.vertices * np.asarray(scale) + np.asarray(offset), mesh.faces)
+
+
+def as_dict(outcome: Outcome) -> dict[str, object]:
+    """For JSON: infinite numbers become null."""
+    return {
+        k: None if isinstance(v, float) and not np.isfinite(v) else v for k, v in dataclasses.asdict(outcome).items()
+    }

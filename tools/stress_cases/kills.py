@@ -1,0 +1,73 @@
+"""Case 13: processes killed while they write; no half file is ever read as a whole one."""
+
+from __future__ import annotations
+
+import os
+import signal
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+import ldtrefl
+from ldtrefl import shapes
+from ldtrefl.image import load_image
+
+from .judge import Outcome
+
+NAME = "13 kills"
+
+
+def run(rays: int, pictures: int) -> list[Outcome]:
+    """A kill for every two of ``pictures`` pixels, of each kind of file."""
+    kills = max(8, pictures // 2)
+    generator = np.random.default_rng(13)
+    image = generator.uniform(0, 1, (300, 400, 3)).astype(np.float32)
+    mesh = shapes.make("torus_knot", {"segments": [96, 16]})
+    maps = ldtrefl.peel(mesh.vertices, mesh.faces, 128, search="linear")
+
+    def image_is_whole(path: Path) -> bool:
+        return load_image(path).shape == image.shape
+
+    def maps_are_whole(path: Path) -> bool:
+        return ldtrefl.LayeredDepthTexture.load(path).start.numpy()[-1] == maps.fragment_count
+
+    jobs: dict[str, tuple[Callable[[Path], None], Callable[[Path], bool]]] = {
+        "picture.png": (lambda path: ldtrefl.save_image(path, image), image_is_whole),
+        "picture.exr": (lambda path: ldtrefl.save_image(path, image), image_is_whole),
+        "maps.npz": (maps.save, maps_are_whole),
+    }
+    outcomes = []
+    with tempfile.TemporaryDirectory() as folder:
+        for name, (write, is_whole) in jobs.items():
+            path = Path(folder) / name
+            start = time.perf_counter()
+            write(path)
+            seconds = time.perf_counter() - start
+            outcome = Outcome(NAME, name, "writer", limit="whole or absent")
+            absent = 0
+            for _ in range(kills):
+                path.unlink(missing_ok=True)
+                child = os.fork()
+                if child == 0:
+                    try:
+                        while True:
+                            write(path)
+                    finally:
+                        os._exit(1)
+                # While it writes for the first time, or over what it has written before.
+                time.sleep(float(generator.uniform(0.0, 3.0 * seconds)))
+                os.kill(child, signal.SIGKILL)
+                os.waitpid(child, 0)
+                outcome.tried += 1
+                if not path.exists():
+                    absent += 1
+                elif not is_whole(path):
+                    outcome.defects += 1
+            outcome.what += f" ({absent} absent)"
+            outcome.passed = outcome.defects == 0
+            outcome.seconds = time.perf_counter() - start
+            outcomes.append(outcome)
+    return outcomes

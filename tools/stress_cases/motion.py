@@ -1,0 +1,71 @@
+"""Case 10: a camera that moves by a tenth of a pixel a frame; nothing may flicker more than the truth does."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+import ldtrefl
+
+from .judge import Outcome
+from .pictures import METHODS, not_finite
+
+NAME = "10 motion"
+PERCENTILES = (50, 75, 90, 95, 99, 99.5, 99.9)
+ALLOWED = {"exact": 1.1, "balanced": 1.1, "fast": 1.5, "linear": 10.0, "bvh": 1.0}
+"""Times the truth's change from frame to frame, at every percentile. The patches of ``fast`` and the paper's blocks of
+texels move in steps: they flicker."""
+FLOOR = 1e-3
+"""Radiance below which a change is not seen."""
+
+
+def run(rays: int, pictures: int) -> list[Outcome]:
+    """60 frames of ``pictures`` pixels a side, of knots of few and of many triangles."""
+    outcomes = []
+    for what, segments in (("knot of 3 k triangles", [96, 16]), ("knot of 375 k triangles", [1500, 125])):
+        changes = {}
+        for by, (method, options) in METHODS.items():
+            start = time.perf_counter()
+            renderer = ldtrefl.Renderer(scene(segments, 0, pictures), method, **options)
+            before, change, broken = None, [], 0
+            for i in range(60):
+                frame = renderer.render(camera=scene(segments, i, pictures).camera)
+                broken += not_finite(frame)
+                if before is not None:
+                    mask = frame.reflector_mask & before.reflector_mask
+                    change.append(np.abs(frame.image - before.image).max(axis=2)[mask])
+                before = frame
+            spread = np.percentile(np.concatenate(change), PERCENTILES)
+            changes[by] = spread
+            outcome = Outcome(NAME, what, by, tried=60 * pictures * pictures, non_finite=broken)
+            outcome.seconds = time.perf_counter() - start
+            outcomes.append(outcome)
+        for outcome in outcomes[-len(METHODS) :]:
+            ratio = (changes[outcome.by] / np.maximum(changes["bvh"], FLOOR)).max()
+            outcome.worst = float(ratio)
+            outcome.limit = f"change from frame to frame <= {ALLOWED[outcome.by]:g} times the truth's (shown as worst)"
+            outcome.passed = outcome.non_finite == 0 and ratio <= ALLOWED[outcome.by] + 1e-9
+    return outcomes
+
+
+def scene(segments: list[int], frame: int, pixels: int) -> ldtrefl.Scene:
+    """A mirror ball and a knot; the camera a tenth of a pixel aside for every frame."""
+    pixel = 2 * 5.0 * np.tan(np.radians(18.0)) / pixels
+    aside = 0.1 * pixel * frame
+    return ldtrefl.Scene(
+        camera=ldtrefl.Camera(
+            eye=(-0.5 + aside, -5.0, 0.8), look_at=(0.3 + aside, 0.0, 0.0), fov_y=36.0, width=pixels, height=pixels
+        ),
+        lights=(ldtrefl.Light(kind="directional", direction=(0.3, 0.8, -0.7), radiance=(1.0, 1.0, 1.0)),),
+        objects=(
+            ldtrefl.Object(shape="sphere", material=ldtrefl.Material(albedo=(0.02,) * 3, mirror=(0.9,) * 3)),
+            ldtrefl.Object(
+                shape="torus_knot",
+                params={"segments": segments},
+                rotate=(1, 0.3, 0, 50),
+                scale=0.75,
+                translate=(1.2, -1.4, 0.1),
+            ),
+        ),
+    )
