@@ -22,6 +22,7 @@ from rich.table import Table
 from typer.exceptions import TyperException
 
 from ldtrefl import launch, metrics, shapes
+from ldtrefl.cache import MapCache, keep_maps_in
 from ldtrefl.device_scene import DeviceMesh
 from ldtrefl.errors import InputError
 from ldtrefl.image import check_writable, difference_image, save_image
@@ -45,6 +46,12 @@ app = typer.Typer(
     help="Reflections on curved objects by layered depth textures, compared with ray tracing.",
 )
 
+cache_commands = typer.Typer(add_completion=False, help="The maps that are kept on disk between runs.")
+app.add_typer(cache_commands, name="cache")
+
+CacheFolder = Annotated[
+    Path | None, typer.Option("--cache", metavar="DIR", help="Keep maps here; the user's cache folder if not given.")
+]
 SceneFile = Annotated[Path, typer.Argument(metavar="SCENE", help="A scene file (TOML).")]
 Settings = Annotated[
     list[str] | None, typer.Option("--set", metavar="OPTION=VALUE", help="An option of the method; may be repeated.")
@@ -80,18 +87,28 @@ def render(
     ] = None,
     method: Annotated[str | None, typer.Option(help="See `ldtrefl methods`; the scene's own if not given.")] = None,
     settings: Settings = None,
+    stats: Annotated[bool, typer.Option("--stats", help="Say what was done and what was skipped.")] = False,
+    cache: CacheFolder = None,
+    no_cache: Annotated[bool, typer.Option("--no-cache", help="Neither read nor keep maps on disk.")] = False,
     device: Device = None,
     threads: Threads = None,
 ) -> None:
     """Render a scene to a picture."""
     launch.set_threads(threads)
     path = check_writable(output or Path(scene.stem + ".png"))
-    loaded = load_scene(scene)
-    with _progress():
-        frame = Renderer(loaded, method, device, **_options(settings)).render()
-        save_image(path, frame.image)
+    if cache is not None and no_cache:
+        raise InputError("--cache and --no-cache exclude each other")
+    with _maps_kept(cache, no_cache):
+        loaded = load_scene(scene)
+        with _progress():
+            frame = Renderer(loaded, method, device, **_options(settings)).render()
+            save_image(path, frame.image)
     total = sum(frame.stats.seconds.values())
-    _console().print(f"{path}: {frame.image.shape[1]} x {frame.image.shape[0]} in {total:.2f} s", _stages(frame))
+    console = _console()
+    console.print(f"{path}: {frame.image.shape[1]} x {frame.image.shape[0]} in {total:.2f} s", _stages(frame))
+    if stats:
+        for line in frame.stats.in_words():
+            console.print(line)
 
 
 @app.command()
@@ -169,6 +186,22 @@ def info(
         _mesh_info(_mesh_or_shape(file))
 
 
+@cache_commands.command("info")
+def cache_info(cache: CacheFolder = None) -> None:
+    """Say where maps are kept, how many, and how large."""
+    kept = MapCache(cache)
+    files = kept.files()
+    total = sum(size for _, size, _ in files)
+    _console().print(f"{kept.folder}: {len(files)} files, {total / 1e6:.1f} MB of at most {kept.limit / 1e6:.0f} MB")
+
+
+@cache_commands.command("clear")
+def cache_clear(cache: CacheFolder = None) -> None:
+    """Remove all kept maps."""
+    kept = MapCache(cache)
+    _console().print(f"{kept.folder}: {kept.clear()} files removed")
+
+
 @app.command()
 def methods() -> None:
     """List every method and its options."""
@@ -177,6 +210,22 @@ def methods() -> None:
         console.print(f"[bold]{name}[/bold]  {method.describe()}")
         for option, (default, words) in method.options().items():
             console.print(f"    {option} = {default!r}  {words}")
+
+
+@contextmanager
+def _maps_kept(folder: Path | None, no_cache: bool) -> Iterator[None]:
+    """Keep maps on disk inside this block. Where the user's own folder cannot be written there is no cache."""
+    try:
+        cache = None if no_cache else MapCache(folder)
+    except InputError:
+        if folder is not None:
+            raise
+        cache = None
+    keep_maps_in(cache)
+    try:
+        yield
+    finally:
+        keep_maps_in(None)
 
 
 def _console() -> Console:

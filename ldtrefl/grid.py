@@ -18,6 +18,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import warp as wp
 
 LANES = wp.constant(8)
@@ -69,6 +70,17 @@ def number_of_cell(bricks: wp.vec3i, x: int, y: int, z: int) -> int:
     return CELLS * brick + ((z % BRICK) * BRICK + y % BRICK) * BRICK + x % BRICK
 
 
+_DTYPES = {
+    "leaps": wp.uint8,
+    "brick": wp.int32,
+    "mask": wp.uint64,
+    "block": wp.int32,
+    "rows": wp.float32,
+    "triangle": wp.int32,
+}
+"""The arrays that are a grid's own."""
+
+
 @dataclass(frozen=True, eq=False)
 class Grid:
     """An occupancy grid on a device."""
@@ -80,9 +92,30 @@ class Grid:
     patches: bool
     """Whether patches stand for triangles."""
 
+    def packed(self) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+        """(arrays, values) that :meth:`unpacked` makes the same grid from, the mesh left out."""
+        arrays = {name: getattr(self.view, name).numpy() for name in _DTYPES}
+        values = {name: [float(x) for x in getattr(self.view, name)] for name in ("low", "high", "cell_offset")}
+        values["bricks"] = [int(n) for n in self.view.bricks]
+        plain = {name: float(getattr(self.view, name)) for name in ("front", "cells_per_unit")}
+        return arrays, {**values, **plain, "records": int(self.records), "patches": bool(self.patches)}
+
+    @classmethod
+    def unpacked(
+        cls, arrays: dict[str, np.ndarray], values: dict[str, Any], vertices: wp.array, faces: wp.array
+    ) -> Grid:
+        """The grid of a mesh on a device from what :meth:`packed` gave; on the CPU it shares the arrays' memory."""
+        view = GridView()
+        for name, dtype in _DTYPES.items():
+            setattr(view, name, wp.array(arrays[name], dtype=dtype, device=vertices.device, copy=False))
+        for name in ("low", "high", "cell_offset"):
+            setattr(view, name, wp.vec3(*values[name]))
+        view.bricks = wp.vec3i(*values["bricks"])
+        view.front, view.cells_per_unit = values["front"], values["cells_per_unit"]
+        view.vertices, view.faces = vertices, faces
+        return cls(view, values["records"], values["patches"])
+
     @property
     def nbytes(self) -> int:
         """Bytes that the grid takes, the mesh not counted."""
-        view = self.view
-        sizes = ((view.leaps, 1), (view.brick, 4), (view.mask, 8), (view.block, 4), (view.rows, 4), (view.triangle, 4))
-        return sum(array.shape[0] * size for array, size in sizes)
+        return sum(array.nbytes for array in self.packed()[0].values())

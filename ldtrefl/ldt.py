@@ -6,6 +6,7 @@ import functools
 import os
 import tempfile
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,6 +15,7 @@ import warp as wp
 from pydantic import Field, TypeAdapter, ValidationError
 
 from ldtrefl import launch
+from ldtrefl.cache import Entry, current_cache, key_of
 from ldtrefl.cubemap import FACE_NAMES, TexelFrame, texel_frame
 from ldtrefl.device_scene import DeviceMesh
 from ldtrefl.errors import InputError, first_fault, unknown_name
@@ -40,6 +42,9 @@ LINEAR_STEPS = 512
 BINARY_STEPS = 8
 """Default of ``binary_steps``: a texel's step is halved to less than a hundredth."""
 
+WORTH_KEEPING = 10_000
+"""Triangles from which maps are kept on disk: fewer are peeled in the time of reading."""
+
 RAYS_ALL_AROUND = 4096
 FEW_BACKS = 2
 """Of so many rays so few may meet a back in a closed mesh that is wound one way: one in 100,000 slips through."""
@@ -59,6 +64,8 @@ class LayeredDepthTexture:
         self.geometry = geometry
         self.frame = frame
         self.quality: Quality = quality
+        self.from_cache = False
+        """Whether what was asked for last came from the cache in use (``cache.py``)."""
 
     @functools.cached_property
     def _rasteriser(self) -> Rasteriser:
@@ -66,14 +73,37 @@ class LayeredDepthTexture:
 
     @functools.cached_property
     def _maps(self) -> Maps:
+        device = self.geometry.vertices.device
+        return self._kept("maps", self._make_maps, lambda entry: Maps.unpacked(entry.arrays, device))
+
+    def _make_maps(self) -> Maps:
         return sort_fragments(self.frame, self._rasteriser.fragments())
 
     @functools.cached_property
     def grid(self) -> Grid:
         """The occupancy grid that the exact search walks."""
+        mesh = self.geometry.vertices, self.geometry.faces
+        return self._kept("grid", self._make_grid, lambda entry: Grid.unpacked(entry.arrays, entry.values, *mesh))
+
+    def _make_grid(self) -> Grid:
         made = build_grid(self.geometry, self.resolution, self.quality)
         if made.view.front != 0.0 and _shows_backs(made):
             made.view.front = 0.0
+        return made
+
+    def _kept(self, kind: str, make: Callable[[], Any], read: Callable[[Entry], Any]) -> Any:
+        """What the cache in use has, or else what is made now, and then kept there."""
+        cache, mesh = current_cache(), self.geometry.mesh
+        if cache is None or len(mesh.faces) < WORTH_KEEPING:
+            return make()
+        options = {"kind": kind, "resolution": self.resolution, "quality": self.quality}
+        key = key_of([mesh.vertices, mesh.faces], options)
+        entry = cache.load(key)
+        self.from_cache = entry is not None
+        if entry is not None:
+            return read(entry)
+        made = make()
+        cache.store(key, *made.packed())
         return made
 
     @property
@@ -99,7 +129,7 @@ class LayeredDepthTexture:
     @property
     def fragment_count(self) -> int:
         """Fragments in the three maps; each serves two faces."""
-        return self._rasteriser.count
+        return self._maps.depth.size if "_maps" in self.__dict__ else self._rasteriser.count
 
     @property
     def record_count(self) -> int:

@@ -50,9 +50,6 @@ NEGLIGIBLE = wp.constant(1.0e-18)
 FAR = wp.constant(1.0e30)
 """The t of planes that are never reached."""
 
-ONE_THIRD = wp.constant(1.0 / 3.0)
-"""Barycentrics of a triangle's centre."""
-
 PER_BRICK = wp.constant(0.25)
 """Bricks in a cell."""
 
@@ -416,7 +413,7 @@ def record_coordinates(views: wp.array(dtype=GridView), index: int, found: GridH
     row = LANES * ROWS * block + lane
     kind = views[index].rows[row + 12 * LANES]
     if kind == SMALL_PATCH:
-        return wp.vec2(ONE_THIRD, ONE_THIRD)
+        return wp.vec2(-1.0, -1.0)
     if kind == TRIANGLE:
         p = found.local
         u = (

@@ -285,6 +285,16 @@ class Maps:
     reference: wp.array
     balanced: wp.array
 
+    def packed(self) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+        """(arrays, nothing else) that :meth:`unpacked` makes the same maps from."""
+        return {name: array.numpy() for name, array in vars(self).items()}, {}
+
+    @classmethod
+    def unpacked(cls, arrays: dict[str, np.ndarray], device: wp.Device) -> Maps:
+        """Maps from what :meth:`packed` gave; on the CPU they share the arrays' memory."""
+        dtypes = {"start": wp.int32, "depth": wp.float32, "reference": wp.int32, "balanced": wp.uint8}
+        return cls(**{k: wp.array(arrays[k], dtype=dtype, device=device, copy=False) for k, dtype in dtypes.items()})
+
     @property
     def nbytes(self) -> int:
         """Bytes of the four arrays."""

@@ -25,6 +25,7 @@ from ldtrefl.gbuffer import GBuffer, GBufferView, pixel_view
 from ldtrefl.shade import (
     Surface,
     environment_radiance,
+    extended_coordinates,
     make_direct_radiance,
     mirror_direction,
     surface_at,
@@ -261,9 +262,12 @@ def shade_hits_kernel(tracer: Tracer) -> wp.Kernel:
             radiance[pixel] = radiance[pixel] + wp.cw_mul(weight, environment_radiance(lighting, direction))
         else:
             uv = hits.barycentrics[i]
+            point = rays.origin[i] + hits.t[i] * direction
+            if uv[0] < 0.0:
+                uv = extended_coordinates(objects[index], hits.triangle[i], point)
             surface = surface_at(objects, index, hits.triangle[i], uv[0], uv[1], direction)
             # The ray's own point: a map's hit lies a little off the triangle.
-            surface.position = rays.origin[i] + hits.t[i] * direction
+            surface.position = point
             light = direct_radiance(views, objects, lighting, surface)
             if wp.max(surface.mirror) > 0.0:
                 onwards = mirror_direction(direction, surface.normal)

@@ -15,6 +15,15 @@ from ldtrefl.device_scene import LightingRecord, ObjectRecord
 SMALLEST_NORMAL = wp.constant(1.0e-12)
 """Squared length below which a vertex normal says nothing and the facet's is taken."""
 
+SMALLEST_SINE = wp.constant(1.0e-6)
+"""Squared sine of a triangle's corner below which nothing is extended beyond it."""
+
+FARTHEST_TURN = wp.constant(0.1)
+"""Radians that a normal may turn beyond the triangle that it is known on. A smooth surface bends less over a patch."""
+
+ONE_THIRD = wp.constant(1.0 / 3.0)
+"""Barycentrics of a triangle's centre."""
+
 
 @wp.struct
 class Surface:
@@ -86,6 +95,28 @@ def schlick(reflectance: wp.vec3, cosine: float) -> wp.vec3:
 def mirror_direction(direction: wp.vec3, normal: wp.vec3) -> wp.vec3:
     """The direction reflected about the normal's plane (either side of it gives the same)."""
     return wp.normalize(direction - 2.0 * wp.dot(direction, normal) * normal)
+
+
+@wp.func
+def extended_coordinates(record: ObjectRecord, triangle: int, point: wp.vec3) -> wp.vec2:
+    """Barycentrics of a point about a triangle that stands for its neighbours, too: outside it they go on linearly.
+
+    So shading is smooth over a patch of many triangles, though only one of them is known. They go on until the normal
+    has turned by ``FARTHEST_TURN``: the normals of a noisy mesh say nothing of their neighbours'. ``point`` is in
+    device space.
+    """
+    corners = record.faces[triangle]
+    a, b, c = record.vertices[corners[0]], record.vertices[corners[1]], record.vertices[corners[2]]
+    e, f, g = b - a, c - a, wp.transform_point(record.unit_from_device, point) - a
+    ee, ef, ff, ge, gf = wp.dot(e, e), wp.dot(e, f), wp.dot(f, f), wp.dot(g, e), wp.dot(g, f)
+    determinant = ee * ff - ef * ef
+    middle = wp.vec2(ONE_THIRD, ONE_THIRD)
+    if not determinant > SMALLEST_SINE * ee * ff:
+        return middle
+    offset = wp.vec2((ff * ge - ef * gf) / determinant, (ee * gf - ef * ge) / determinant) - middle
+    na = record.normals[corners[0]]
+    turn = wp.length(offset[0] * (record.normals[corners[1]] - na) + offset[1] * (record.normals[corners[2]] - na))
+    return middle + wp.min(1.0, FARTHEST_TURN * wp.length(na) / wp.max(turn, SMALLEST_NORMAL)) * offset
 
 
 @wp.func

@@ -22,6 +22,9 @@ SHORTEST = wp.constant(1.0e-15)
 LONGEST = wp.constant(1.0e15)
 """Lengths of directions whose squares stay well inside float32's range."""
 
+ONE_THIRD = wp.constant(1.0 / 3.0)
+"""Barycentrics of a triangle's centre."""
+
 NEAR = wp.constant(8.0)
 """Distance from the middle of the unit cube beyond which a ray's way to it is taken in float64."""
 
@@ -32,7 +35,7 @@ class Hit:
 
     t: float
     triangle: int
-    u: float  # barycentrics: weights of the triangle's second and third corner
+    u: float  # barycentrics: weights of the triangle's second and third corner; -1 if the triangle is one of many there
     v: float
     normal: wp.vec3  # of the facet, unit, by the triangle's winding
     steps: int  # texels or samples looked at
@@ -130,6 +133,9 @@ def batch_kernel(tracer: Tracer) -> wp.Kernel:
             if hit.triangle >= 0:
                 hit.t = float((wp.float64(hit.t) + skipped) / (per_half * wp.float64(length)))
                 normal = hit.normal
+                if hit.u < 0.0:
+                    hit.u = ONE_THIRD
+                    hit.v = ONE_THIRD
         else:
             invalid_out[i] = wp.uint8(1)
         t_out[i] = hit.t

@@ -33,9 +33,9 @@ class Size:
 
 
 CASES: dict[str, tuple[Size, Size]] = {  # name of the module -> full and quick size
-    "place": (Size(4000, 96), Size(300, 32)),
-    "directions": (Size(4000, 0), Size(200, 0)),
-    "origins": (Size(3000, 0), Size(200, 0)),
+    "place": (Size(3000, 96), Size(300, 32)),
+    "directions": (Size(2500, 0), Size(200, 0)),
+    "origins": (Size(2000, 0), Size(200, 0)),
     "meshes": (Size(4000, 0), Size(300, 0)),
     "contact": (Size(0, 96), Size(0, 32)),
     "cameras": (Size(0, 64), Size(0, 24)),

@@ -71,7 +71,7 @@ class Ldt(Method):
                 geometry = self.scene.objects[index].geometry
                 if id(geometry) not in maps:
                     maps[id(geometry)] = peel_mesh(geometry, self.config.resolution, quality=quality, search=search)
-                    stats.count("objects_peeled", 1)
+                    stats.count("objects_from_cache" if maps[id(geometry)].from_cache else "objects_peeled", 1)
                     stats.count("records", maps[id(geometry)].record_count)
                     stats.count("map_bytes", maps[id(geometry)].nbytes)
         tracer = TRACERS[search]
@@ -91,4 +91,7 @@ class Ldt(Method):
         with stats.stage("cull", self.scene.device):
             regions = find_regions(gbuffer, self.config.cull, stats)
         bounces = self.config.max_bounces or self.scene.scene.reflection.max_bounces
-        return Reflection(*follow_rays(gbuffer, regions, lambda needed: self._bind(needed, stats), bounces, stats))
+        followed = follow_rays(gbuffer, regions, lambda needed: self._bind(needed, stats), bounces, stats)
+        meshes = {id(entry.geometry) for entry in self.scene.objects}
+        stats.count("objects_skipped", len(meshes) - len(self.__dict__["_maps"]))
+        return Reflection(*followed)

@@ -35,8 +35,8 @@ RADII = (1e-3, 1e-2, 0.1, 0.3, 1.0, 3.0)
 MOVED = 96
 """Rays about one for each radius."""
 
-FLOAT32 = 1.2e-7
-"""Relative rounding of a float32, twice."""
+FLOAT32 = 2.4e-7
+"""Relative rounding of a float32, four times."""
 
 EXAMINED = 100
 """Disagreements of a run that are examined at most, evenly spread."""
