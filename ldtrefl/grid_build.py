@@ -43,6 +43,8 @@ CELL_MARGIN = wp.constant(1.0e-3)
 PATCH_RISE = wp.vec3(0.1)
 """Cells, a third of a patch, by which the box is widened for patches that rise out of it where the surface bends.
 Without it one ray in ten thousand slipped under them to the far wall."""
+ROUNDING = wp.constant(4.0e-7)
+"""Of a ray's coordinates in cells, relative to the grid's size: a few roundings of a float32."""
 THINNEST = wp.constant(6.0e-7)
 """Height, in unit space, below which a triangle has no area: it is ten roundings of its corners, its normal chance."""
 LARGEST_LEAP = wp.constant(250)
@@ -298,6 +300,18 @@ def find_leaps(
                 leaps_out[base + i] = wp.uint8(leap)
 
 
+@wp.func
+def as_double(p: wp.vec3) -> wp.vec3d:
+    """The same vector in float64."""
+    return wp.vec3d(wp.float64(p[0]), wp.float64(p[1]), wp.float64(p[2]))
+
+
+@wp.func
+def as_single(p: wp.vec3d) -> wp.vec3:
+    """The nearest vector in float32."""
+    return wp.vec3(float(p[0]), float(p[1]), float(p[2]))
+
+
 @launch.kernel
 def fill_records(
     first: int,
@@ -323,23 +337,34 @@ def fill_records(
     piece = piece_of(target, item[i])
     triangle_out[LANES * at + lane] = piece.triangle
     corner = piece.corner - float(BRICK) * wp.vec3(float(x), float(y), float(z))
-    normal = wp.cross(piece.edge_u, piece.edge_v)
+    # In float64: of a slim triangle's cross product float32 leaves a plane that misses its far corner.
+    u, v = as_double(piece.edge_u), as_double(piece.edge_v)
+    normal = wp.cross(u, v)
     square = wp.dot(normal, normal)
-    u, v, across = piece.edge_u, piece.edge_v, piece.edge_v - piece.edge_u
-    longest = wp.max(wp.dot(across, across), wp.max(wp.dot(u, u), wp.dot(v, v)))
-    thin = THINNEST * target.cells_per_unit
+    longest = wp.max(wp.dot(v - u, v - u), wp.max(wp.dot(u, u), wp.dot(v, v)))
+    thin = wp.float64(THINNEST * target.cells_per_unit)
     row = LANES * ROWS * at + lane
     if square > thin * thin * longest:
-        unit = normal / wp.sqrt(square)
-        along_u = wp.cross(v, normal) / square
-        along_v = wp.cross(normal, u) / square
+        unit = as_single(normal / wp.sqrt(square))
+        along_u = as_single(wp.cross(v, normal) / square)
+        along_v = as_single(wp.cross(normal, u) / square)
+        at_u, at_v = -wp.dot(along_u, corner), -wp.dot(along_v, corner)
+        if piece.kind == TRIANGLE:
+            # Move the sides apart by a ray's rounding, which is many barycentric units where a triangle is slim.
+            reach = ROUNDING * float(BRICK * wp.max(target.bricks))
+            beside_u, beside_v = reach * wp.length(along_u), reach * wp.length(along_v)
+            widening = 1.0 + beside_u + beside_v + reach * wp.length(along_u + along_v)
+            along_u = along_u / widening
+            along_v = along_v / widening
+            at_u = (at_u + beside_u) / widening
+            at_v = (at_v + beside_v) / widening
         for k in range(3):
             rows_out[row + k * LANES] = unit[k]
             rows_out[row + (4 + k) * LANES] = along_u[k]
             rows_out[row + (8 + k) * LANES] = along_v[k]
         rows_out[row + 3 * LANES] = wp.dot(unit, corner)
-        rows_out[row + 7 * LANES] = -wp.dot(along_u, corner)
-        rows_out[row + 11 * LANES] = -wp.dot(along_v, corner)
+        rows_out[row + 7 * LANES] = at_u
+        rows_out[row + 11 * LANES] = at_v
         rows_out[row + 12 * LANES] = piece.kind
     else:
         for k in range(ROWS):

@@ -42,10 +42,10 @@ def compared(
     differ = hit != (b.triangle >= 0)
     differ[both] |= np.abs(a.t[both] - b.t[both]) > 1e-4
     outcome.defects = int(differ.sum())
-    outcome.passed = 100.0 * outcome.defects <= percent * outcome.tried
+    outcome.passed = bool(100.0 * outcome.defects <= percent * outcome.tried)
     if triangles is not None and by in ("exact", "bvh"):
         other = both & (number != b.triangle) & (np.abs(a.barycentrics - 0.5).max(axis=1) < 0.499)
-        outcome.passed &= other.sum() <= 1e-3 * outcome.tried
+        outcome.passed &= bool(other.sum() <= 1e-3 * outcome.tried)
     return outcome
 
 
@@ -111,7 +111,7 @@ def any_turn(mesh: ldtrefl.Mesh, rays: int) -> list[Outcome]:
         outcome.limit = (
             f"most wrong rays <= {SPREAD:g} times the mean, over three deviations of chance (most, least shown)"
         )
-        outcome.passed = max(counts) <= SPREAD * mean + 3 * np.sqrt(mean + 1)
+        outcome.passed = bool(max(counts) <= SPREAD * mean + 3 * np.sqrt(mean + 1))
         outcomes.append(outcome)
     return outcomes
 
@@ -141,6 +141,6 @@ def threads_and_runs(pixels: int) -> list[Outcome]:
         outcome = Outcome(
             NAME, "objects in another order", by, tried=differ_by.size, wrong_hits=int((differ_by > 1e-5).sum())
         )
-        outcome.limit, outcome.passed = "the same picture", not (differ_by > 1e-5).any()
+        outcome.limit, outcome.passed = "the same picture", not bool((differ_by > 1e-5).any())
         outcomes.append(outcome)
     return outcomes

@@ -313,7 +313,6 @@ def moved(mesh: ldtrefl.Mesh, scale: object = 1.0, offset: object = 0.0) -> ldtr
 
 
 def as_dict(outcome: Outcome) -> dict[str, object]:
-    """For JSON: infinite numbers become null."""
-    return {
-        k: None if isinstance(v, float) and not np.isfinite(v) else v for k, v in dataclasses.asdict(outcome).items()
-    }
+    """For JSON: plain numbers, infinite ones become null."""
+    values = {name: getattr(value, "item", lambda value=value: value)() for name, value in vars(outcome).items()}
+    return {name: None if isinstance(v, float) and not np.isfinite(v) else v for name, v in values.items()}
