@@ -5,7 +5,7 @@ The pipeline, one module a stage:
     scene file -> Scene (scene, shapes, mesh) -> arrays on the device (device_scene)
       -> G-buffer: what the camera sees (gbuffer, raster)
       -> a method (methods/): its tracer answers reflected rays (trace), whose life is written once (reflect)
-           ldt: cull (cull), peel on first need (peel -> ldt: fragments, grid), march (march)
+           ldt: cull (cull), peel on first need (ldt: peel -> fragments, patches -> grid; kept by cache), march (march)
            bvh: the ground truth (raycast)
       -> shade, the same functions for all (shade) -> composite (render) -> image (image), compared (metrics)
 """

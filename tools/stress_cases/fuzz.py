@@ -38,7 +38,13 @@ FUZZ = Limit(
     p999=0.1,
     why="any mesh, stretched up to 1:100, slim triangles met at grazing angles, from inside, outside and on it",
 )
-BVH = Limit(radius=1.0, p999=0.1, why="Warp's tree also finds triangles whose area is a rounding of their corners")
+BVH = Limit(
+    radius=1.0,
+    p999=0.1,
+    wrong=1.0,
+    defects=False,
+    why="Warp's tree also finds triangles whose area is a rounding, planes seen edge on, and loses rays through vertices",
+)
 TRACERS = ("exact", "balanced", "fast", "linear", "bvh")
 
 

@@ -29,7 +29,7 @@ BRUTE_TRIANGLES = 4000
 TEXELS = 256
 """Texels along an object's longest side that distances are given in."""
 
-RADII = (1e-3, 1e-2, 0.1, 0.3, 1.0, 3.0)
+RADII = (1e-5, 1e-4, 1e-3, 1e-2, 0.1, 0.3, 1.0, 3.0)
 """Texels by which a ray is moved aside, smallest first, to explain a disagreement."""
 
 MOVED = 96

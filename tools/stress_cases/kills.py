@@ -13,6 +13,7 @@ import numpy as np
 
 import ldtrefl
 from ldtrefl import shapes
+from ldtrefl.cache import MapCache
 from ldtrefl.image import load_image
 
 from .judge import Outcome
@@ -34,10 +35,19 @@ def run(rays: int, pictures: int) -> list[Outcome]:
     def maps_are_whole(path: Path) -> bool:
         return ldtrefl.LayeredDepthTexture.load(path).start.numpy()[-1] == maps.fragment_count
 
+    def keep(path: Path) -> None:
+        arrays = {"start": maps.start.numpy(), "depth": maps.depth.numpy()}
+        MapCache(path.parent).store(path.stem, arrays, {})
+
+    def kept_is_whole(path: Path) -> bool:
+        entry = MapCache(path.parent).load(path.stem)
+        return entry is not None and len(entry.arrays["depth"]) == maps.fragment_count
+
     jobs: dict[str, tuple[Callable[[Path], None], Callable[[Path], bool]]] = {
         "picture.png": (lambda path: ldtrefl.save_image(path, image), image_is_whole),
         "picture.exr": (lambda path: ldtrefl.save_image(path, image), image_is_whole),
         "maps.npz": (maps.save, maps_are_whole),
+        "cache.ldtmaps": (keep, kept_is_whole),
     }
     outcomes = []
     with tempfile.TemporaryDirectory() as folder:
