@@ -43,8 +43,8 @@ CELL_MARGIN = wp.constant(1.0e-3)
 PATCH_RISE = wp.vec3(0.1)
 """Cells, a third of a patch, by which the box is widened for patches that rise out of it where the surface bends.
 Without it one ray in ten thousand slipped under them to the far wall."""
-ROUNDING = wp.constant(4.0e-7)
-"""Of a ray's coordinates in cells, relative to the grid's size: a few roundings of a float32."""
+ROUNDING = wp.constant(1.5e-7)
+"""Of a ray's coordinates in cells, relative to the grid's size: two roundings of a float32."""
 THINNEST = wp.constant(6.0e-7)
 """Height, in unit space, below which a triangle has no area: it is ten roundings of its corners, its normal chance."""
 LARGEST_LEAP = wp.constant(250)

@@ -43,7 +43,7 @@ BVH = Limit(
     p999=0.1,
     wrong=1.0,
     defects=False,
-    why="Warp's tree also finds triangles whose area is a rounding, planes seen edge on, and loses rays through vertices",
+    why="Warp's tree finds triangles whose area is a rounding and planes seen edge on, and loses rays through vertices",
 )
 TRACERS = ("exact", "balanced", "fast", "linear", "bvh")
 

@@ -230,7 +230,7 @@ def judge(
     radius, defects = 0.0, 0
     examined = min(len(disagree), EXAMINED) if limit.defects else 0
     for i in disagree[np.linspace(0, len(disagree) - 1, examined).astype(int)]:
-        found = explaining_radius(truth, origins[i], directions[i], t[i], texel, limit.slips)
+        found = explaining_radius(truth, origins[i], directions[i], t[i], int(hits.triangle[i]), texel, limit.slips)
         radius = max(radius, found)
         defects += found > limit.radius
     outcome = Outcome(
@@ -258,7 +258,7 @@ def judge(
 
 
 def explaining_radius(
-    truth: Truth, origin: np.ndarray, direction: np.ndarray, t: float, texel: float, slips: bool
+    truth: Truth, origin: np.ndarray, direction: np.ndarray, t: float, triangle: int, texel: float, slips: bool
 ) -> float:
     """The least of ``RADII`` by which the ray is moved aside for the truth to give ``t``; infinite if none is.
 
@@ -269,7 +269,13 @@ def explaining_radius(
     length = np.linalg.norm(d)
     # Aside, and so that far rays are moved aside where they meet the object, not at their start.
     ways = rng.normal(size=(MOVED, 3))
-    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    if triangle >= 0:
+        # Into the triangle that was found, too: at a sharp corner chance does not find the way.
+        corners = truth.mesh.vertices[truth.mesh.faces[triangle]]
+        inwards = corners.mean(axis=0) - (o + t * d)
+        ways[:4] = np.array([1.0, 0.5, 0.1, 0.01])[:, None] * inwards
+    ways[4:] /= np.linalg.norm(ways[4:], axis=1, keepdims=True)
+    ways[:4] /= max(float(np.linalg.norm(ways[0])), 1e-300)
     for radius in RADII:
         moved = np.sort(truth.hits(o + radius * texel * ways, np.broadcast_to(d, (MOVED, 3))))
         with np.errstate(invalid="ignore"):
