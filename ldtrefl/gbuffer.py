@@ -103,8 +103,18 @@ def last_pixel(high: wp.float64) -> int:
 
 
 @wp.func
+def beyond(corner: wp.vec3d, width: int, height: int) -> int:
+    """The sides of the view that a corner lies beyond, a bit each (the outcode of Cohen and Sutherland)."""
+    x, y = corner[0], corner[1]
+    depth = wp.where(corner[2] > BEHIND, wp.float64(1.0), corner[2])
+    code = wp.where(x < BEHIND, 1, 0) + wp.where(y < BEHIND, 2, 0)
+    code += wp.where(x > depth * wp.float64(width), 4, 0) + wp.where(y > depth * wp.float64(height), 8, 0)
+    return code
+
+
+@wp.func
 def pixel_box(a: wp.vec3d, b: wp.vec3d, c: wp.vec3d, width: int, height: int) -> PixelBox:
-    """The pixels whose centres lie in the box about a projected triangle; all where that has no bounds."""
+    """The pixels whose centres lie in the box about a projected triangle; all where that has no bounds in the view."""
     box = PixelBox()
     nearest = wp.max(a[2], wp.max(b[2], c[2]))
     farthest = wp.min(a[2], wp.min(b[2], c[2]))
@@ -119,7 +129,7 @@ def pixel_box(a: wp.vec3d, b: wp.vec3d, c: wp.vec3d, width: int, height: int) ->
             box.last_x = wp.min(last_pixel(high_x), width - 1)
             box.first_y = wp.max(first_pixel(low_y), 0)
             box.last_y = wp.min(last_pixel(high_y), height - 1)
-        else:
+        elif (beyond(a, width, height) & beyond(b, width, height) & beyond(c, width, height)) == 0:
             box.last_x = width - 1
             box.last_y = height - 1
     return box
