@@ -23,7 +23,6 @@ CHUNK = wp.constant(1024)
 @launch.kernel
 def count_items(
     part: int,
-    parts: int,
     # In:
     numbers: wp.array(dtype=wp.int32),
     bins_per_part: int,
@@ -39,7 +38,6 @@ def count_items(
 @launch.kernel
 def place_items(
     part: int,
-    parts: int,
     # In:
     numbers: wp.array(dtype=wp.int32),
     bins_per_part: int,

@@ -147,20 +147,19 @@ def part_count(kernel: wp.Kernel, count: int, device: wp.Device) -> int:
     return _state.threads if device.is_cpu and count >= 2 * _shortest_slice(kernel) else 1
 
 
-def launch_parts(kernel: wp.Kernel, count: int, arguments: Sequence[Any], device: wp.Device, parts: int = 0) -> None:
-    """Run ``kernel(part, parts, *arguments)`` with ``count`` items for every part, the parts side by side.
+def launch_parts(kernel: wp.Kernel, count: int, arguments: Sequence[Any], device: wp.Device, parts: int) -> None:
+    """Run ``kernel(part, *arguments)`` with ``count`` items for each of ``parts`` parts, the parts side by side.
 
     For kernels whose items share memory: item ``i`` of part ``p`` may write only what belongs to ``p``. Inside a part
-    the CPU goes through the items in order, alone; CUDA runs them at once, so such kernels use atomics all the same
-    (Warp's atomics are plain additions on the CPU). ``parts = 0`` means one a thread; CUDA has one part in any case.
+    the CPU goes through the items in order, alone; CUDA has one part and runs its items at once, so such kernels use
+    atomics all the same (Warp's atomics are plain additions on the CPU).
     """
     if count <= 0:
         return
     if not device.is_cpu:
-        wp.launch(kernel, dim=count, inputs=[0, 1, *arguments], device=device)
+        wp.launch(kernel, dim=count, inputs=[0, *arguments], device=device)
         return
-    parts = parts or _state.threads
-    _run(kernel, device, [parts, *arguments], [(part, count) for part in range(parts)])
+    _run(kernel, device, arguments, [(part, count) for part in range(parts)])
 
 
 def _run(kernel: wp.Kernel, device: wp.Device, arguments: Sequence[Any], slices: list[tuple[int, int]]) -> None:
