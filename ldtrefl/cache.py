@@ -14,7 +14,6 @@ import logging
 import mmap
 import os
 import struct
-import tempfile
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,6 +24,7 @@ import platformdirs
 import xxhash
 
 from ldtrefl.errors import InputError
+from ldtrefl.files import writable_folder, written_whole
 
 FORMAT = 1
 """Goes up when what files hold changes: old ones are then not found."""
@@ -69,14 +69,9 @@ class MapCache:
         Raises:
             InputError: it cannot be made or written.
         """
-        self.folder = Path(folder) if folder is not None else Path(platformdirs.user_cache_dir("ldtrefl", False))
+        chosen = Path(platformdirs.user_cache_dir("ldtrefl", False)) if folder is None else Path(folder)
+        self.folder = writable_folder(chosen, make=True)
         self.limit = limit
-        try:
-            self.folder.mkdir(parents=True, exist_ok=True)
-            with tempfile.TemporaryFile(dir=self.folder):
-                pass
-        except OSError as error:
-            raise InputError(f"{self.folder}: the cache folder cannot be written ({error.strerror})") from error
 
     def path(self, key: str) -> Path:
         """Where the file of this name is, or would be."""
@@ -105,26 +100,20 @@ class MapCache:
             offset += -(-array.nbytes // ALIGNMENT) * ALIGNMENT
         text = json.dumps({"arrays": places, "values": values}).encode()
         text += b" " * (-(HEADER.size + len(text)) % ALIGNMENT)
-        scratch = None
+        digest = xxhash.xxh3_64(text)
         try:
-            with tempfile.NamedTemporaryFile(dir=self.folder, prefix=f".{key}-", delete=False) as file:
-                scratch = Path(file.name)
-                digest = xxhash.xxh3_64(text)
+            with written_whole(self.path(key)) as scratch, scratch.open("wb") as file:
                 file.write(HEADER.pack(MAGIC, 0, 0, 0))
                 file.write(text)
                 for array in arrays.values():
                     data = np.ascontiguousarray(array).reshape(-1).view(np.uint8)
-                    padding = bytes(-data.nbytes % ALIGNMENT)
-                    for piece in (data.data, padding):
+                    for piece in (data.data, bytes(-data.nbytes % ALIGNMENT)):
                         digest.update(piece)
                         file.write(piece)
                 file.seek(0)
                 file.write(HEADER.pack(MAGIC, HEADER.size + len(text) + offset, len(text), digest.intdigest()))
-            os.replace(scratch, self.path(key))
-        except OSError as error:
-            if scratch is not None:
-                scratch.unlink(missing_ok=True)
-            _log.warning("%s: cannot be written (%s), the maps are not kept", self.path(key), error.strerror)
+        except InputError as error:
+            _log.warning("%s; the maps are not kept", error)
             return
         self.shrink()
 

@@ -6,7 +6,6 @@ Exit status: 0 done, 2 the input is wrong (one line on standard error), 1 anythi
 import json
 import os
 import sys
-import tempfile
 import time
 import tomllib
 from collections.abc import Iterator
@@ -25,6 +24,7 @@ from ldtrefl import launch, metrics, shapes
 from ldtrefl.cache import MapCache, keep_maps_in
 from ldtrefl.device_scene import DeviceMesh
 from ldtrefl.errors import InputError
+from ldtrefl.files import writable_folder, written_whole
 from ldtrefl.image import check_writable, difference_image, save_image
 from ldtrefl.layers import draw_layers
 from ldtrefl.ldt import DEFAULT_RESOLUTION, peel_mesh
@@ -129,7 +129,7 @@ def compare(
     launch.set_threads(threads)
     names = [name.strip() for name in methods.split(",") if name.strip()]
     options = _method_options(settings, [reference, *names])
-    folder = _writable_folder(output or Path(scene.stem + "-compare"))
+    folder = writable_folder(output or Path(scene.stem + "-compare"), make=True)
     loaded = load_scene(scene)
     rows: dict[str, dict[str, Any]] = {}
     with _progress():
@@ -141,7 +141,8 @@ def compare(
             rows[name] = _errors(frame, truth, renderer.texel_sizes(resolution))
             save_image(folder / f"{name}.png", frame.image)
             save_image(folder / f"{name}-difference.png", difference_image(frame.image, truth.image))
-    _write_text(folder / "compare.json", json.dumps(_finite({"scene": str(scene), "reference": reference, **rows})))
+    with written_whole(folder / "compare.json") as scratch:
+        scratch.write_text(json.dumps(_finite({"scene": str(scene), "reference": reference, **rows})) + "\n")
     _console().print(_error_table(rows, f"{scene} against {reference} ({truth.reflector_mask.sum()} reflector pixels)"))
     _console().print(f"{reference}: {sum(truth.stats.seconds.values()):.3f} s", _stages(truth))
     _console().print(f"images in {folder}")
@@ -333,22 +334,6 @@ def _mesh_or_shape(name: str) -> Mesh:
     if name in shapes.names() and not Path(name).exists():
         return shapes.make(name)
     return load_mesh(name)
-
-
-def _writable_folder(folder: Path) -> Path:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-    except OSError as error:
-        raise InputError(f"{folder}: the folder cannot be written ({error.strerror})") from error
-    return folder
-
-
-def _write_text(path: Path, text: str) -> None:
-    with tempfile.NamedTemporaryFile("w", dir=path.parent, prefix=f".{path.name}-", delete=False) as scratch:
-        scratch.write(text + "\n")
-    os.replace(scratch.name, path)
 
 
 def _scene_info(scene: Scene) -> None:

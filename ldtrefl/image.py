@@ -1,19 +1,17 @@
 """Pictures in files: PNG (sRGB, 8 bits), EXR (linear float), and difference pictures.
 
 In memory an image is ``(height, width, 3)`` float32, linear radiance, row 0 at the top. Files are read and written by
-OpenImageIO. A file is written whole or not at all: it is made beside its place and then moved there.
-"""
+OpenImageIO."""
 
 from __future__ import annotations
 
-import os
-import tempfile
 from pathlib import Path
 
 import numpy as np
 import OpenImageIO as oiio
 
 from ldtrefl.errors import InputError, caught_stderr
+from ldtrefl.files import writable_folder, written_whole
 
 WRITABLE = (".png", ".exr")
 LINEAR_FORMATS = ("openexr", "hdr")
@@ -79,10 +77,9 @@ def check_writable(path: str | Path) -> Path:
     if not folder.is_dir():
         raise InputError(f"{path}: the folder {folder} does not exist")
     try:
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-    except OSError as error:
-        raise InputError(f"{path}: the folder {folder} cannot be written ({error.strerror})") from error
+        writable_folder(folder)
+    except InputError as error:
+        raise error.within(str(path)) from None
     return path
 
 
@@ -104,18 +101,10 @@ def save_image(path: str | Path, image: np.ndarray) -> None:
         pixels = np.ascontiguousarray(image)
         spec = oiio.ImageSpec(image.shape[1], image.shape[0], 3, oiio.FLOAT)
         spec.attribute("oiio:ColorSpace", "linear")
-    handle, scratch = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent)
-    os.close(handle)
-    try:
-        writer = oiio.ImageOutput.create(scratch)
-        written = writer is not None and writer.open(scratch, spec) and writer.write_image(pixels) and writer.close()
-        if not written:
+    with written_whole(path) as scratch:
+        writer = oiio.ImageOutput.create(str(scratch))
+        if not (writer and writer.open(str(scratch), spec) and writer.write_image(pixels) and writer.close()):
             raise InputError(f"{path}: could not be written ({oiio.geterror() or 'disk full?'})")
-        os.chmod(scratch, 0o666 & ~_umask())
-        os.replace(scratch, path)
-    except BaseException:
-        Path(scratch).unlink(missing_ok=True)
-        raise
 
 
 def difference_image(image: np.ndarray, reference: np.ndarray, gain: float = 4.0) -> np.ndarray:
@@ -130,9 +119,3 @@ def difference_image(image: np.ndarray, reference: np.ndarray, gain: float = 4.0
     encoded[..., 1] -= 0.5 * np.clip(np.abs(delta), 0, 1)
     encoded[..., 2] -= 0.5 * np.clip(delta, -1, 1)
     return linear_from_srgb(np.clip(encoded, 0, 1))
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

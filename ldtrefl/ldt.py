@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import functools
-import os
-import tempfile
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -19,6 +17,7 @@ from ldtrefl.cache import Entry, current_cache, key_of
 from ldtrefl.cubemap import FACE_NAMES, TexelFrame, texel_frame
 from ldtrefl.device_scene import DeviceMesh
 from ldtrefl.errors import InputError, first_fault, unknown_name
+from ldtrefl.files import written_whole
 from ldtrefl.fragments import LdtView
 from ldtrefl.grid import Grid
 from ldtrefl.grid_build import Quality, build_grid
@@ -221,7 +220,6 @@ class LayeredDepthTexture:
         Raises:
             InputError: the file cannot be written.
         """
-        path = Path(path)
         arrays = {
             "format": np.int64(FORMAT),
             "vertices": self.geometry.mesh.vertices,
@@ -234,17 +232,8 @@ class LayeredDepthTexture:
             "depth": self.depth.numpy(),
             "reference": self.reference.numpy(),
         }
-        try:
-            with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}-", delete=False) as scratch:
-                try:
-                    np.savez(scratch, **arrays)
-                    scratch.close()
-                    os.replace(scratch.name, path)
-                except BaseException:
-                    Path(scratch.name).unlink(missing_ok=True)
-                    raise
-        except OSError as error:
-            raise InputError(f"{path}: cannot be written ({error.strerror})") from error
+        with written_whole(path) as scratch, scratch.open("wb") as file:
+            np.savez(file, **arrays)
 
     @classmethod
     def load(cls, path: str | Path, device: str | None = None) -> LayeredDepthTexture:

@@ -209,7 +209,7 @@ def test_nothing_is_left_behind_when_writing_fails(tmp_path: Path, monkeypatch: 
     def fail(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("ldtrefl.image.os.replace", fail)
+    monkeypatch.setattr("ldtrefl.files.os.replace", fail)
     with pytest.raises((OSError, ldtrefl.InputError)):
         ldtrefl.save_image(tmp_path / "a.png", np.zeros((4, 4, 3), np.float32))
     assert list(tmp_path.iterdir()) == []

@@ -33,6 +33,7 @@ from embreex.mesh_construction import TriangleMesh
 import ldtrefl
 from ldtrefl import launch, metrics, shapes
 from ldtrefl.device_scene import DeviceMesh
+from ldtrefl.files import written_whole
 from ldtrefl.grid_build import Quality
 from ldtrefl.ldt import peel_mesh
 from ldtrefl.march import TRACERS
@@ -480,11 +481,10 @@ def draw_plots(result: dict[str, Any], folder: Path) -> None:
 
 
 def _save(figure: Any, path: Path) -> None:
-    scratch = path.with_suffix(".part.png")
     figure.tight_layout()
-    figure.savefig(scratch, dpi=110)
+    with written_whole(path) as scratch:
+        figure.savefig(scratch, dpi=110)
     plt.close(figure)
-    os.replace(scratch, path)
 
 
 def reading(result: dict[str, Any]) -> str:
@@ -572,9 +572,8 @@ def main() -> None:
     }
     ldtrefl.set_threads()
     for name, text in (("benchmark.json", json.dumps(result, indent=1)), ("benchmark.md", reading(result))):
-        scratch = arguments.output / f".{name}.part"
-        scratch.write_text(text)
-        os.replace(scratch, arguments.output / name)
+        with written_whole(arguments.output / name) as scratch:
+            scratch.write_text(text)
     draw_plots(result, arguments.output)
     print(f"written to {arguments.output}")
 

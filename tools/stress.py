@@ -13,7 +13,6 @@ from __future__ import annotations
 import argparse
 import importlib
 import json
-import os
 import sys
 import time
 from dataclasses import dataclass
@@ -21,6 +20,8 @@ from pathlib import Path
 from types import ModuleType
 
 from stress_cases.judge import Outcome, as_dict
+
+from ldtrefl.files import written_whole
 
 
 @dataclass(frozen=True)
@@ -102,9 +103,8 @@ def main() -> int:
         arguments.output.mkdir(parents=True, exist_ok=True)
         report = json.dumps([as_dict(o) for o in outcomes], indent=1)
         for path, text in (("stress.json", report), ("stress.md", table(outcomes, time.perf_counter() - begin))):
-            scratch = arguments.output / f".{path}.part"
-            scratch.write_text(text)
-            os.replace(scratch, arguments.output / path)
+            with written_whole(arguments.output / path) as scratch:
+                scratch.write_text(text)
     return 1 if any(not o.passed for o in outcomes) else 0
 
 
