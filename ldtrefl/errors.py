@@ -3,12 +3,8 @@
 from __future__ import annotations
 
 import difflib
-import os
-import sys
-import tempfile
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
-from typing import TYPE_CHECKING, BinaryIO
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
@@ -27,20 +23,6 @@ class InputError(ValueError):
     def within(self, place: str) -> InputError:
         """The same fault, with the file or key that holds it put in front."""
         return InputError(f"{place}: {self}")
-
-
-@contextmanager
-def caught_stderr() -> Iterator[BinaryIO]:
-    """Catch what native libraries print on standard error inside this block: a file, to be read after it."""
-    with tempfile.TemporaryFile() as said:
-        sys.stderr.flush()
-        kept = os.dup(2)
-        try:
-            os.dup2(said.fileno(), 2)
-            yield said
-        finally:
-            os.dup2(kept, 2)
-            os.close(kept)
 
 
 def unknown_name(kind: str, name: str, allowed: Iterable[str]) -> InputError:

@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO as oiio
 
-from ldtrefl.errors import InputError, caught_stderr
+from ldtrefl.errors import InputError
 from ldtrefl.files import writable_folder, written_whole
+from ldtrefl.native import caught_stderr
 
 WRITABLE = (".png", ".exr")
 LINEAR_FORMATS = ("openexr", "hdr")

@@ -20,7 +20,8 @@ from typing import Any
 
 import warp as wp
 
-from ldtrefl.errors import InputError, caught_stderr
+from ldtrefl.errors import InputError
+from ldtrefl.native import caught_stderr
 
 wp.config.log_level = wp.LOG_ERROR
 

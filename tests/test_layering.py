@@ -12,6 +12,7 @@ PACKAGE = Path(ldtrefl.__file__).parent
 BOTTOM_TO_TOP = (
     "errors",
     "files",
+    "native",
     "cache",
     "launch",
     "image",
