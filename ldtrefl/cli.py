@@ -8,6 +8,7 @@ import os
 import sys
 import time
 import tomllib
+from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -107,7 +108,7 @@ def render(
     console = _console()
     console.print(f"{path}: {frame.image.shape[1]} x {frame.image.shape[0]} in {total:.2f} s", _stages(frame))
     if stats:
-        for line in frame.stats.in_words():
+        for line in _in_words(frame.stats.counters):
             console.print(line)
 
 
@@ -232,6 +233,29 @@ def _maps_kept(folder: Path | None, no_cache: bool) -> Iterator[None]:
 def _console() -> Console:
     # In a pipe there is no width to fit into: lines are not broken.
     return Console(highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else 200)
+
+
+def _in_words(counters: dict[str, int]) -> list[str]:
+    """What was done and what was skipped, a line each."""
+    n = defaultdict(int, counters)
+    lines = [f"{n['reflector_pixels']} of {n['pixels']} pixels see a reflector"]
+    if not n["reflector_pixels"]:
+        return [*lines, "no reflector in view: nothing culled, peeled or traced"]
+    if n["triangles_tested"]:
+        share = 100.0 * n["triangles_culled"] / n["triangles_tested"]
+        lines.append(
+            f"{n['triangles_culled']} of {n['triangles_tested']} pairs of triangle and object culled ({share:.0f}%)"
+        )
+    if n["rays_saved"]:
+        lines.append(f"{n['rays_saved']} searches of a ray for an object saved by culling")
+    per_ray = f", {n['steps'] / n['rays']:.1f} steps each" if n["rays"] and n["steps"] else ""
+    lines.append(f"{n['rays']} rays reflected{per_ray}")
+    made = [f"{n['objects_peeled']} objects peeled"]
+    made += [f"{n['objects_from_cache']} from the cache"] if n["objects_from_cache"] else []
+    made += [f"{n['objects_skipped']} not needed"] if n["objects_skipped"] else []
+    if any(name.startswith("objects_") for name in counters):
+        lines.append(", ".join(made) + f"; {n['records']} records, {n['map_bytes'] / 1e6:.1f} MB")
+    return lines
 
 
 def _stages(frame: Frame) -> str:

@@ -11,7 +11,6 @@ from __future__ import annotations
 import functools
 import os
 import time
-from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -229,28 +228,6 @@ class Stats:
         finally:
             self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
             _state.stage = outer
-
-    def in_words(self) -> list[str]:
-        """What was done and what was skipped, a line each."""
-        n = defaultdict(int, self.counters)
-        lines = [f"{n['reflector_pixels']} of {n['pixels']} pixels see a reflector"]
-        if not n["reflector_pixels"]:
-            return [*lines, "no reflector in view: nothing culled, peeled or traced"]
-        if n["triangles_tested"]:
-            share = 100.0 * n["triangles_culled"] / n["triangles_tested"]
-            lines.append(
-                f"{n['triangles_culled']} of {n['triangles_tested']} pairs of triangle and object culled ({share:.0f}%)"
-            )
-        if n["rays_saved"]:
-            lines.append(f"{n['rays_saved']} searches of a ray for an object saved by culling")
-        per_ray = f", {n['steps'] / n['rays']:.1f} steps each" if n["rays"] and n["steps"] else ""
-        lines.append(f"{n['rays']} rays reflected{per_ray}")
-        made = [f"{n['objects_peeled']} objects peeled"]
-        made += [f"{n['objects_from_cache']} from the cache"] if n["objects_from_cache"] else []
-        made += [f"{n['objects_skipped']} not needed"] if n["objects_skipped"] else []
-        if any(name.startswith("objects_") for name in self.counters):
-            lines.append(", ".join(made) + f"; {n['records']} records, {n['map_bytes'] / 1e6:.1f} MB")
-        return lines
 
     def count(self, name: str, amount: int) -> None:
         """Add ``amount`` to ``counters[name]``."""
