@@ -118,4 +118,5 @@ class Grid:
     @property
     def nbytes(self) -> int:
         """Bytes that the grid takes, the mesh not counted."""
-        return sum(array.nbytes for array in self.packed()[0].values())
+        arrays = (getattr(self.view, name) for name in _DTYPES)
+        return sum(array.size * wp.types.type_size_in_bytes(array.dtype) for array in arrays)

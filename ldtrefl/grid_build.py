@@ -29,7 +29,7 @@ DENSE_GRID_CELLS = 128
 
 PATCH_TEXELS: dict[Quality, float] = {"fast": 4.0, "balanced": 1.6}
 """Texels along a side of a patch. The plane of one is off by the square of its side: on a torus knot at 256, 1.6 texels
-give 0.15% wrong hits and a tenth of a texel at the 99th percentile; 1 texel a third of that at 15% more time."""
+give 0.1% wrong hits and a tenth of a texel at the 99th percentile; 1 texel a third of that at 15% more time."""
 
 DENSE = 2.2
 """Small triangles per texel of surface from which patches stand for them: the maps are then the coarser picture."""

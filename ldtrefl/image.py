@@ -1,7 +1,8 @@
 """Pictures in files: PNG (sRGB, 8 bits), EXR (linear float), and difference pictures.
 
 In memory an image is ``(height, width, 3)`` float32, linear radiance, row 0 at the top. Files are read and written by
-OpenImageIO."""
+OpenImageIO.
+"""
 
 from __future__ import annotations
 
