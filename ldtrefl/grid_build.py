@@ -159,8 +159,6 @@ def find_cells(
     # In:
     target: GridTarget,
     items: wp.array(dtype=wp.int32),
-    first_item: int,
-    step: int,
     places: wp.array(dtype=wp.int32),
     is_counting: int,
     # Out:
@@ -170,9 +168,11 @@ def find_cells(
     touched_out: wp.array(dtype=wp.uint8),  # 1 for cells with a pair: the same value from whoever writes
 ):
     i = first + wp.tid()
-    item = first_item + step * i
+    item = int(i)
     if items.shape[0] > 0:
         item = items[i]
+    elif target.patches.shape[0] > 0:
+        item = -1 - i
     place = int(0)
     end = int(0)
     if is_counting == 0:
@@ -391,7 +391,7 @@ def build_grid(geometry: DeviceMesh, resolution: int, quality: Quality) -> Grid:
             return Grid(view, cell.shape[0], True)
     cells = DENSE_GRID_CELLS if triangles > DENSE_TRIANGLES else GRID_CELLS
     target, _ = _target(geometry, texel_frame(geometry.mesh, resolution), cells)
-    cell, item, _ = _cells_of(target, None, triangles, 0, 1, geometry.vertices.device)
+    cell, item, _ = _cells_of(target, None, triangles, geometry.vertices.device)
     return Grid(_built(target, geometry, cell, item), cell.shape[0], False)
 
 
@@ -407,15 +407,15 @@ def _target(geometry: DeviceMesh, frame: TexelFrame, cells: int) -> tuple[Any, f
 
 
 def _cells_of(
-    target: Any, items: wp.array | None, count: int, first_item: int, step: int, device: wp.Device
+    target: Any, items: wp.array | None, count: int, device: wp.Device
 ) -> tuple[wp.array, wp.array, wp.array]:
-    """(cell, item) of every pair that touches, and (cells,) uint8, 1 for cells touched; items listed, or else
-    ``first_item + step * i``."""
+    """(cell, item) of every pair that touches, and (cells,) uint8, 1 for cells touched; of the items listed, or else of
+    all patches, or of all triangles where there are none."""
     listed = wp.empty(0, dtype=wp.int32, device=device) if items is None else items
     counts = wp.zeros(count + 1, dtype=wp.int32, device=device)
     nothing = wp.empty(0, dtype=wp.int32, device=device)
     touched = wp.zeros(_brick_count(target) * int(CELLS), dtype=wp.uint8, device=device)
-    inputs = [target, listed, first_item, step]
+    inputs = [target, listed]
     launch.launch(find_cells, count, [*inputs, nothing, 1, counts, nothing, nothing, touched], device)
     places, total = exclusive_scan(counts)
     cell, item = (wp.empty(total, dtype=wp.int32, device=device) for _ in range(2))
@@ -430,11 +430,11 @@ def _brick_count(target: Any) -> int:
 def _patches_and_the_rest(target: Any, survey: Survey) -> tuple[wp.array, wp.array]:
     """(cell, item) of all patches, and of the triangles that no patch stands for."""
     device = target.patches.device
-    cell, item, touched = _cells_of(target, None, survey.count, -1, -1, device)
+    cell, item, touched = _cells_of(target, None, survey.count, device)
     kept = survey.kept_triangles(touched)
     if kept.shape[0] == 0:
         return cell, item
-    more_cells, more_items, _ = _cells_of(target, kept, kept.shape[0], 0, 0, device)
+    more_cells, more_items, _ = _cells_of(target, kept, kept.shape[0], device)
     return _joined(cell, more_cells), _joined(item, more_items)
 
 
