@@ -102,8 +102,34 @@ def facing_triangle(
 
 
 @wp.func
-def count_patches(target: PatchTarget, a: wp.vec4i, b: wp.vec4i, c: wp.vec4i) -> int:
-    """Texel centres that a triangle covers in the maps that face it."""
+def patch_piece(target: PatchTarget, giver: Corners, axis: int, u: int, v: int, depth: float, normal: wp.vec3) -> Piece:
+    """The plane of a triangle over a texel of the map of ``axis``, a little wider than the texel."""
+    slope_u, slope_v = -normal[(axis + 1) % 3] / normal[axis], -normal[(axis + 2) % 3] / normal[axis]
+    half = 0.5 + PATCH_MARGIN
+    corner = wp.vec3(float(u) - PATCH_MARGIN, float(v) - PATCH_MARGIN, depth - half * (slope_u + slope_v))
+    along_u = 2.0 * half * target.cells_per_texel * point_from_texel(axis, wp.vec3(1.0, 0.0, slope_u))
+    along_v = 2.0 * half * target.cells_per_texel * point_from_texel(axis, wp.vec3(0.0, 1.0, slope_v))
+    piece = Piece()
+    piece.corner = target.cells_per_texel * point_from_texel(axis, corner)
+    # The record's normal is the triangle's.
+    piece.edge_u = wp.where(normal[axis] < 0.0, along_v, along_u)
+    piece.edge_v = wp.where(normal[axis] < 0.0, along_u, along_v)
+    piece.kind = SMALL_PATCH
+    for i in range(3):
+        longest = wp.max(giver.a[i], wp.max(giver.b[i], giver.c[i])) - wp.min(
+            giver.a[i], wp.min(giver.b[i], giver.c[i])
+        )
+        if unsnap(longest) > 1.0:
+            piece.kind = LARGE_PATCH
+    piece.triangle = giver.triangle
+    return piece
+
+
+@wp.func
+def lift_texels(target: PatchTarget, giver: Corners, place: int, patches_out: wp.array(dtype=Piece)) -> int:
+    """Count the texel centres that a triangle covers in the maps that face it; make their patches from ``place`` on,
+    unless it is negative."""
+    a, b, c = giver.a, giver.b, giver.c
     normal = fixed_normal(a, b, c)
     count = int(0)
     for axis in range(3):
@@ -111,7 +137,11 @@ def count_patches(target: PatchTarget, a: wp.vec4i, b: wp.vec4i, c: wp.vec4i) ->
         if tri.area != wp.int64(0):
             for v in range(tri.first_v, tri.last_v + 1):
                 for u in range(tri.first_u, tri.last_u + 1):
-                    if cover(tri, u, v).covered:
+                    at = cover(tri, u, v)
+                    if at.covered:
+                        if place >= 0:
+                            depth = interpolate(tri, at, unsnap(a[axis]), unsnap(b[axis]), unsnap(c[axis]))
+                            patches_out[place + count] = patch_piece(target, giver, axis, u, v, depth, normal)
                         count += 1
     return count
 
@@ -121,6 +151,7 @@ def survey_triangles(
     first: int,
     # In:
     target: PatchTarget,
+    no_patches: wp.array(dtype=Piece),
     # Out, per chunk: small triangles; patches; triangles that give some, and their corners; what is left open; volume
     small_out: wp.array(dtype=wp.int32),
     patches_out: wp.array(dtype=wp.int32),
@@ -163,13 +194,13 @@ def survey_triangles(
             cell_out[triangle] = number_of_cell(target.bricks, x, y, z)
             # Most triangles of a dense mesh lie between texel centres along two axes and end here.
             if holds_centre(low_x, high_x) + holds_centre(low_y, high_y) + holds_centre(low_z, high_z) >= 2:
-                given = count_patches(target, a, b, c)
+                giver = Corners()
+                giver.a = a
+                giver.b = b
+                giver.c = c
+                giver.triangle = triangle
+                given = lift_texels(target, giver, -1, no_patches)
                 if given > 0:
-                    giver = Corners()
-                    giver.a = a
-                    giver.b = b
-                    giver.c = c
-                    giver.triangle = triangle
                     corners_out[begin + givers] = giver
                     givers += 1
                     patches += given
@@ -178,22 +209,6 @@ def survey_triangles(
     givers_out[chunk] = givers
     open_out[chunk] = left_open
     volume_out[chunk] = volume
-
-
-@wp.func
-def patch_piece(target: PatchTarget, axis: int, u: int, v: int, depth: float, normal: wp.vec3) -> Piece:
-    """The plane of a triangle over a texel of the map of ``axis``, a little wider than the texel."""
-    slope_u, slope_v = -normal[(axis + 1) % 3] / normal[axis], -normal[(axis + 2) % 3] / normal[axis]
-    half = 0.5 + PATCH_MARGIN
-    corner = wp.vec3(float(u) - PATCH_MARGIN, float(v) - PATCH_MARGIN, depth - half * (slope_u + slope_v))
-    along_u = 2.0 * half * target.cells_per_texel * point_from_texel(axis, wp.vec3(1.0, 0.0, slope_u))
-    along_v = 2.0 * half * target.cells_per_texel * point_from_texel(axis, wp.vec3(0.0, 1.0, slope_v))
-    piece = Piece()
-    piece.corner = target.cells_per_texel * point_from_texel(axis, corner)
-    # The record's normal is the triangle's.
-    piece.edge_u = wp.where(normal[axis] < 0.0, along_v, along_u)
-    piece.edge_v = wp.where(normal[axis] < 0.0, along_u, along_v)
-    return piece
 
 
 @kernel
@@ -210,27 +225,7 @@ def make_patches(
     chunk = first + wp.tid()
     place = int(places[chunk])
     for k in range(givers[chunk]):
-        giver = corners[CHUNK * chunk + k]
-        a, b, c = giver.a, giver.b, giver.c
-        normal = fixed_normal(a, b, c)
-        kind = float(SMALL_PATCH)
-        for axis in range(3):
-            longest = wp.max(a[axis], wp.max(b[axis], c[axis])) - wp.min(a[axis], wp.min(b[axis], c[axis]))
-            if unsnap(longest) > 1.0:
-                kind = LARGE_PATCH
-        for axis in range(3):
-            tri = facing_triangle(target, axis, a, b, c, normal)
-            if tri.area != wp.int64(0):
-                for v in range(tri.first_v, tri.last_v + 1):
-                    for u in range(tri.first_u, tri.last_u + 1):
-                        at = cover(tri, u, v)
-                        if at.covered:
-                            depth = interpolate(tri, at, unsnap(a[axis]), unsnap(b[axis]), unsnap(c[axis]))
-                            piece = patch_piece(target, axis, u, v, depth, normal)
-                            piece.kind = kind
-                            piece.triangle = giver.triangle
-                            patches_out[place] = piece
-                            place += 1
+        place += lift_texels(target, corners[CHUNK * chunk + k], place, patches_out)
 
 
 @kernel
@@ -272,8 +267,9 @@ class Survey:
         self._cell = wp.empty(self._triangles, dtype=wp.int32, device=self._device)
         self._open = wp.empty(chunks, dtype=wp.uint64, device=self._device)
         self._volume = wp.empty(chunks, dtype=wp.float64, device=self._device)
+        nothing = wp.empty(0, dtype=Piece, device=self._device)
         outputs = [small, counts, self._givers, self._corners, self._open, self._volume, self._cell]
-        launch_chunks(survey_triangles, self._triangles, [target, *outputs], self._device)
+        launch_chunks(survey_triangles, self._triangles, [target, nothing, *outputs], self._device)
         self._places, self.count = exclusive_scan(counts)
         self.small = int(small.numpy().sum())
         """Triangles of at most two texels."""
