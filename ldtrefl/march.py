@@ -22,6 +22,7 @@ import warp as wp
 from ldtrefl.cubemap import texel_from_point
 from ldtrefl.fragments import LdtView, texel_number, triangle_of
 from ldtrefl.grid import BRICK, CELLS, LANES, ROWS, SMALL_PATCH, TRIANGLE, GridView
+from ldtrefl.shade import plane_coordinates
 from ldtrefl.trace import Hit, Tracer, no_hit
 
 BOX_MARGIN = wp.constant(0.01)
@@ -188,18 +189,18 @@ def march_linear(view: LdtView, origin: wp.vec3, direction: wp.vec3, t_max: floa
 
 
 @wp.func
+def brought_inside(u: float, v: float) -> wp.vec2:
+    """Barycentrics of the triangle's point next to one that lies outside by rounding."""
+    u_inside, v_inside = wp.clamp(u, 0.0, 1.0), wp.clamp(v, 0.0, 1.0)
+    excess = wp.max(u_inside + v_inside, 1.0)
+    return wp.vec2(u_inside / excess, v_inside / excess)
+
+
+@wp.func
 def barycentrics_at(a: wp.vec3, b: wp.vec3, c: wp.vec3, p: wp.vec3) -> wp.vec2:
     """Weights of b and c at the point of the triangle's plane next to ``p``, brought into the triangle."""
-    e, f, g = b - a, c - a, p - a
-    ee, ef, ff = wp.dot(e, e), wp.dot(e, f), wp.dot(f, f)
-    ge, gf = wp.dot(g, e), wp.dot(g, f)
-    determinant = ee * ff - ef * ef
-    if determinant <= 0.0:
-        return wp.vec2(0.0, 0.0)
-    u = wp.clamp((ff * ge - ef * gf) / determinant, 0.0, 1.0)
-    v = wp.clamp((ee * gf - ef * ge) / determinant, 0.0, 1.0)
-    excess = wp.max(u + v, 1.0)
-    return wp.vec2(u / excess, v / excess)
+    at = plane_coordinates(a, b, c, p)
+    return brought_inside(at[0], at[1])
 
 
 MEET_BLOCKS = """
@@ -426,10 +427,7 @@ def record_coordinates(views: wp.array(dtype=GridView), index: int, found: GridH
             + views[index].rows[row + 9 * LANES] * p[1]
             + views[index].rows[row + 10 * LANES] * p[2]
         )
-        u = wp.clamp(u + views[index].rows[row + 7 * LANES], 0.0, 1.0)
-        v = wp.clamp(v + views[index].rows[row + 11 * LANES], 0.0, 1.0)
-        excess = wp.max(u + v, 1.0)
-        return wp.vec2(u / excess, v / excess)
+        return brought_inside(u + views[index].rows[row + 7 * LANES], v + views[index].rows[row + 11 * LANES])
     corners = views[index].faces[views[index].triangle[found.fragment]]
     return barycentrics_at(
         views[index].vertices[corners[0]], views[index].vertices[corners[1]], views[index].vertices[corners[2]], point

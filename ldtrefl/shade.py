@@ -98,6 +98,19 @@ def mirror_direction(direction: wp.vec3, normal: wp.vec3) -> wp.vec3:
 
 
 @wp.func
+def plane_coordinates(a: wp.vec3, b: wp.vec3, c: wp.vec3, p: wp.vec3) -> wp.vec3:
+    """Weights of b and c at the point of a triangle's plane next to ``p``, whether inside or not, and the squared sine
+    of the corner at a; all 0 for a triangle without area."""
+    e, f, g = b - a, c - a, p - a
+    ee, ef, ff = wp.dot(e, e), wp.dot(e, f), wp.dot(f, f)
+    ge, gf = wp.dot(g, e), wp.dot(g, f)
+    determinant = ee * ff - ef * ef
+    if determinant <= 0.0:
+        return wp.vec3(0.0)
+    return wp.vec3((ff * ge - ef * gf) / determinant, (ee * gf - ef * ge) / determinant, determinant / (ee * ff))
+
+
+@wp.func
 def extended_coordinates(record: ObjectRecord, triangle: int, point: wp.vec3) -> wp.vec2:
     """Barycentrics of a point about a triangle that stands for its neighbours, too: outside it they go on linearly.
 
@@ -107,13 +120,11 @@ def extended_coordinates(record: ObjectRecord, triangle: int, point: wp.vec3) ->
     """
     corners = record.faces[triangle]
     a, b, c = record.vertices[corners[0]], record.vertices[corners[1]], record.vertices[corners[2]]
-    e, f, g = b - a, c - a, wp.transform_point(record.unit_from_device, point) - a
-    ee, ef, ff, ge, gf = wp.dot(e, e), wp.dot(e, f), wp.dot(f, f), wp.dot(g, e), wp.dot(g, f)
-    determinant = ee * ff - ef * ef
     middle = wp.vec2(ONE_THIRD, ONE_THIRD)
-    if not determinant > SMALLEST_SINE * ee * ff:
+    at = plane_coordinates(a, b, c, wp.transform_point(record.unit_from_device, point))
+    if not at[2] > SMALLEST_SINE:
         return middle
-    offset = wp.vec2((ff * ge - ef * gf) / determinant, (ee * gf - ef * ge) / determinant) - middle
+    offset = wp.vec2(at[0], at[1]) - middle
     na = record.normals[corners[0]]
     turn = wp.length(offset[0] * (record.normals[corners[1]] - na) + offset[1] * (record.normals[corners[2]] - na))
     return middle + wp.min(1.0, FARTHEST_TURN * wp.length(na) / wp.max(turn, SMALLEST_NORMAL)) * offset

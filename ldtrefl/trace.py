@@ -17,13 +17,11 @@ import warp as wp
 from ldtrefl import launch
 from ldtrefl.device_scene import DeviceMesh
 from ldtrefl.errors import InputError
+from ldtrefl.shade import ONE_THIRD
 
 SHORTEST = wp.constant(1.0e-15)
 LONGEST = wp.constant(1.0e15)
 """Lengths of directions whose squares stay well inside float32's range."""
-
-ONE_THIRD = wp.constant(1.0 / 3.0)
-"""Barycentrics of a triangle's centre."""
 
 NEAR = wp.constant(8.0)
 """Distance from the middle of the unit cube beyond which a ray's way to it is taken in float64."""
