@@ -269,32 +269,29 @@ class GridHit:
     steps: int  # bricks entered and blocks tested
 
 
-@wp.func
-def step_within(index: int, brick: int, leap: int, forward: int, bricks: int) -> int:
-    """A brick's index brought into the cube of ``leap`` bricks that is being left, and into the grid."""
-    if forward == 1:
-        return wp.clamp(index, brick, wp.min(brick + leap, bricks) - 1)
-    return wp.clamp(index, wp.max(brick - leap + 1, 0), brick)
+@wp.struct
+class GridRay:
+    """A ray that has entered an object's box; t counts from the entry, which keeps far rays precise."""
+
+    entry: wp.vec3
+    direction: wp.vec3
+    inverse: wp.vec3  # 1 / direction, 0 along planes that the ray never crosses
+    never: wp.vec3  # added to a plane's t: far for those planes
+    forward: wp.vec3i  # 1 along axes that the ray goes up, 0 down
+    t_enter: float  # before the entry
+    t_end: float  # negative if the ray misses the box
 
 
 @wp.func
-def march_exact(
+def enter_grid(
     views: wp.array(dtype=GridView), index: int, origin: wp.vec3, direction: wp.vec3, t_max: float
-) -> GridHit:
-    """Walk the occupied cells along a ray, nearest first; the first record met is the answer.
-
-    Object ``index``, cell space, ``direction`` of unit length. All indices are stepped as
-    integers and every plane's t is computed from its index, so nothing adds up and nothing stalls.
-    """
-    found = GridHit()
-    found.t = float(wp.inf)
-    found.fragment = -1
-
-    # Enter the object's box; from there on, t counts from the entry point, which keeps far rays precise.
+) -> GridRay:
+    """Slab test against an object's box, cell space."""
+    ray = GridRay()
     t_enter = float(0.0)
     t_exit = t_max
     inverse = wp.vec3(0.0)
-    never = wp.vec3(0.0)  # added to a plane's t: far for planes that the ray runs along
+    never = wp.vec3(0.0)
     for axis in range(3):
         low, high = views[index].low[axis] - CELL_SLACK, views[index].high[axis] + CELL_SLACK
         if wp.abs(direction[axis]) < NEGLIGIBLE:
@@ -307,104 +304,157 @@ def march_exact(
             t_enter = wp.max(t_enter, wp.min(t_low, t_high))
             t_exit = wp.min(t_exit, wp.max(t_low, t_high))
     if not t_enter <= t_exit:
-        return found
-    entry = origin + t_enter * direction
-    t_end = t_exit - t_enter
+        ray.t_end = -1.0
+        return ray
+    ray.t_enter = t_enter
+    ray.t_end = t_exit - t_enter
+    ray.entry = origin + t_enter * direction
+    ray.direction = direction
+    ray.inverse = inverse
+    ray.never = never
+    ray.forward = wp.vec3i(
+        wp.where(direction[0] > 0.0, 1, 0), wp.where(direction[1] > 0.0, 1, 0), wp.where(direction[2] > 0.0, 1, 0)
+    )
+    return ray
+
+
+@wp.func
+def walk_brick(
+    views: wp.array(dtype=GridView), index: int, ray: GridRay, number: int, local: wp.vec3, t: float
+) -> GridHit:
+    """Walk the cells of an occupied brick, in its own coordinates, from ``local``, where the ray enters it at ``t``.
+
+    The hit's t counts from there.
+    """
+    found = GridHit()
+    found.fragment = -1
+    fx, fy, fz = ray.forward[0], ray.forward[1], ray.forward[2]
+    ix, iy, iz = ray.inverse[0], ray.inverse[1], ray.inverse[2]
+    ux, uy, uz = ray.never[0], ray.never[1], ray.never[2]
+    mask = views[index].mask[number]
+    cx, cy, cz = wp.clamp(int(local[0]), 0, 3), wp.clamp(int(local[1]), 0, 3), wp.clamp(int(local[2]), 0, 3)
+    tx = (float(cx + fx) - local[0]) * ix + ux
+    ty = (float(cy + fy) - local[1]) * iy + uy
+    tz = (float(cz + fz) - local[2]) * iz + uz
+    t_in = float(0.0)
+    inside = bool(True)
+    while inside:
+        cell = (cz * BRICK + cy) * BRICK + cx
+        t_out = wp.min(tx, wp.min(ty, tz))
+        if ((mask >> wp.uint64(cell)) & wp.uint64(1)) != wp.uint64(0):
+            first_block = views[index].block[CELLS * number + cell]
+            end_block = views[index].block[CELLS * number + cell + 1]
+            hit = meet_blocks(
+                views[index].rows,
+                first_block,
+                end_block,
+                local[0],
+                local[1],
+                local[2],
+                ray.direction[0],
+                ray.direction[1],
+                ray.direction[2],
+                wp.max(t_in - CELL_SLACK, -t),
+                wp.min(t_out + CELL_SLACK, ray.t_end - t),
+                EDGE_SLACK,
+            )
+            found.steps += end_block - first_block
+            if hit[1] >= 0.0:
+                found.fragment = LANES * first_block + int(hit[1])
+                found.t = hit[0]
+                found.local = local + hit[0] * ray.direction
+                return found
+        t_in = t_out
+        if tx <= ty and tx <= tz:
+            cx += 2 * fx - 1
+            inside = cx >= 0 and cx <= 3
+            tx = (float(cx + fx) - local[0]) * ix + ux
+        elif ty <= tz:
+            cy += 2 * fy - 1
+            inside = cy >= 0 and cy <= 3
+            ty = (float(cy + fy) - local[1]) * iy + uy
+        else:
+            cz += 2 * fz - 1
+            inside = cz >= 0 and cz <= 3
+            tz = (float(cz + fz) - local[2]) * iz + uz
+    return found
+
+
+@wp.func
+def side_of_leap(ray: GridRay, axis: int, brick: int, leap: int) -> float:
+    """The t at which a ray leaves, along an axis, the cube of ``leap`` bricks that begins with ``brick``."""
+    side = wp.where(ray.forward[axis] == 1, brick + leap, brick - leap + 1)
+    return (float(BRICK * side) - ray.entry[axis]) * ray.inverse[axis] + ray.never[axis]
+
+
+@wp.func
+def index_beside(ray: GridRay, axis: int, brick: int, leap: int, t: float, bricks: int) -> int:
+    """A brick's index at ``t`` along an axis other than the one that the cube of ``leap`` bricks is left along: brought
+    into the cube, and into the grid, whatever the rounding."""
+    if leap == 1:
+        return brick
+    index = int((ray.entry[axis] + t * ray.direction[axis]) * PER_BRICK)
+    if ray.forward[axis] == 1:
+        return wp.clamp(index, brick, wp.min(brick + leap, bricks) - 1)
+    return wp.clamp(index, wp.max(brick - leap + 1, 0), brick)
+
+
+@wp.func
+def march_exact(
+    views: wp.array(dtype=GridView), index: int, origin: wp.vec3, direction: wp.vec3, t_max: float
+) -> GridHit:
+    """Walk the occupied cells along a ray, nearest first; the first record met is the answer.
+
+    Object ``index``, cell space, ``direction`` of unit length. All indices are stepped as integers and every plane's t
+    is computed from its index, so nothing adds up and nothing stalls.
+    """
+    nothing = GridHit()
+    nothing.t = float(wp.inf)
+    nothing.fragment = -1
+    ray = enter_grid(views, index, origin, direction, t_max)
+    if ray.t_end < 0.0:
+        return nothing
+    steps = int(0)
     nx, ny, nz = views[index].bricks[0], views[index].bricks[1], views[index].bricks[2]
-    ix, iy, iz = inverse[0], inverse[1], inverse[2]
-    ux, uy, uz = never[0], never[1], never[2]
-    fx = wp.where(direction[0] > 0.0, 1, 0)
-    fy = wp.where(direction[1] > 0.0, 1, 0)
-    fz = wp.where(direction[2] > 0.0, 1, 0)
-    octant = (fx + 2 * fy + 4 * fz) * nx * ny * nz
-    bx = wp.clamp(int(entry[0] * PER_BRICK), 0, nx - 1)
-    by = wp.clamp(int(entry[1] * PER_BRICK), 0, ny - 1)
-    bz = wp.clamp(int(entry[2] * PER_BRICK), 0, nz - 1)
+    octant = (ray.forward[0] + 2 * ray.forward[1] + 4 * ray.forward[2]) * nx * ny * nz
+    bx = wp.clamp(int(ray.entry[0] * PER_BRICK), 0, nx - 1)
+    by = wp.clamp(int(ray.entry[1] * PER_BRICK), 0, ny - 1)
+    bz = wp.clamp(int(ray.entry[2] * PER_BRICK), 0, nz - 1)
     t = float(0.0)
-    while t <= t_end:
+    inside = bool(True)
+    while inside and t <= ray.t_end:
         brick = (bz * ny + by) * nx + bx
         leap = int(views[index].leaps[octant + brick])
-        found.steps += 1
+        steps += 1
         if leap == 0:
             leap = 1
-            # Walk the cells of the brick, in its own coordinates and with t from where the ray enters it.
-            number = views[index].brick[brick]
-            mask = views[index].mask[number]
-            local = entry + t * direction - float(BRICK) * wp.vec3(float(bx), float(by), float(bz))
-            cx, cy, cz = wp.clamp(int(local[0]), 0, 3), wp.clamp(int(local[1]), 0, 3), wp.clamp(int(local[2]), 0, 3)
-            tx = (float(cx + fx) - local[0]) * ix + ux
-            ty = (float(cy + fy) - local[1]) * iy + uy
-            tz = (float(cz + fz) - local[2]) * iz + uz
-            t_in = float(0.0)
-            inside = bool(True)
-            while inside:
-                cell = (cz * BRICK + cy) * BRICK + cx
-                t_out = wp.min(tx, wp.min(ty, tz))
-                if ((mask >> wp.uint64(cell)) & wp.uint64(1)) != wp.uint64(0):
-                    first_block = views[index].block[CELLS * number + cell]
-                    end_block = views[index].block[CELLS * number + cell + 1]
-                    hit = meet_blocks(
-                        views[index].rows,
-                        first_block,
-                        end_block,
-                        local[0],
-                        local[1],
-                        local[2],
-                        direction[0],
-                        direction[1],
-                        direction[2],
-                        wp.max(t_in - CELL_SLACK, -t),
-                        wp.min(t_out + CELL_SLACK, t_end - t),
-                        EDGE_SLACK,
-                    )
-                    found.steps += end_block - first_block
-                    if hit[1] >= 0.0:
-                        found.fragment = LANES * first_block + int(hit[1])
-                        found.t = wp.max(t_enter + (t + hit[0]), 0.0)
-                        found.local = local + hit[0] * direction
-                        return found
-                t_in = t_out
-                if tx <= ty and tx <= tz:
-                    cx += 2 * fx - 1
-                    inside = cx >= 0 and cx <= 3
-                    tx = (float(cx + fx) - local[0]) * ix + ux
-                elif ty <= tz:
-                    cy += 2 * fy - 1
-                    inside = cy >= 0 and cy <= 3
-                    ty = (float(cy + fy) - local[1]) * iy + uy
-                else:
-                    cz += 2 * fz - 1
-                    inside = cz >= 0 and cz <= 3
-                    tz = (float(cz + fz) - local[2]) * iz + uz
+            local = ray.entry + t * direction - float(BRICK) * wp.vec3(float(bx), float(by), float(bz))
+            found = walk_brick(views, index, ray, views[index].brick[brick], local, t)
+            steps += found.steps
+            if found.fragment >= 0:
+                found.t = wp.max(ray.t_enter + (t + found.t), 0.0)
+                found.steps = steps
+                return found
         # Leave the cube of ``leap`` bricks ahead through the nearest of its far sides.
-        tx = (float(BRICK * wp.where(fx == 1, bx + leap, bx - leap + 1)) - entry[0]) * ix + ux
-        ty = (float(BRICK * wp.where(fy == 1, by + leap, by - leap + 1)) - entry[1]) * iy + uy
-        tz = (float(BRICK * wp.where(fz == 1, bz + leap, bz - leap + 1)) - entry[2]) * iz + uz
+        tx, ty, tz = side_of_leap(ray, 0, bx, leap), side_of_leap(ray, 1, by, leap), side_of_leap(ray, 2, bz, leap)
+        t = wp.max(t, wp.min(tx, wp.min(ty, tz)))
         if tx <= ty and tx <= tz:
-            t = wp.max(t, tx)
-            if leap > 1:
-                by = step_within(int((entry[1] + t * direction[1]) * PER_BRICK), by, leap, fy, ny)
-                bz = step_within(int((entry[2] + t * direction[2]) * PER_BRICK), bz, leap, fz, nz)
-            bx += (2 * fx - 1) * leap
-            if bx < 0 or bx >= nx:
-                return found
+            by = index_beside(ray, 1, by, leap, t, ny)
+            bz = index_beside(ray, 2, bz, leap, t, nz)
+            bx += (2 * ray.forward[0] - 1) * leap
+            inside = bx >= 0 and bx < nx
         elif ty <= tz:
-            t = wp.max(t, ty)
-            if leap > 1:
-                bx = step_within(int((entry[0] + t * direction[0]) * PER_BRICK), bx, leap, fx, nx)
-                bz = step_within(int((entry[2] + t * direction[2]) * PER_BRICK), bz, leap, fz, nz)
-            by += (2 * fy - 1) * leap
-            if by < 0 or by >= ny:
-                return found
+            bx = index_beside(ray, 0, bx, leap, t, nx)
+            bz = index_beside(ray, 2, bz, leap, t, nz)
+            by += (2 * ray.forward[1] - 1) * leap
+            inside = by >= 0 and by < ny
         else:
-            t = wp.max(t, tz)
-            if leap > 1:
-                bx = step_within(int((entry[0] + t * direction[0]) * PER_BRICK), bx, leap, fx, nx)
-                by = step_within(int((entry[1] + t * direction[1]) * PER_BRICK), by, leap, fy, ny)
-            bz += (2 * fz - 1) * leap
-            if bz < 0 or bz >= nz:
-                return found
-    return found
+            bx = index_beside(ray, 0, bx, leap, t, nx)
+            by = index_beside(ray, 1, by, leap, t, ny)
+            bz += (2 * ray.forward[2] - 1) * leap
+            inside = bz >= 0 and bz < nz
+    nothing.steps = steps
+    return nothing
 
 
 @wp.func
