@@ -1,4 +1,4 @@
-"""What tests share: real meshes where they are, rays, and tracing by a third tracer."""
+"""What tests share: real meshes where they are, and a small scene."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import ldtrefl
@@ -30,6 +29,28 @@ REAL_MESHES = (
 CLOSED_MESHES = ("armadillo.ply", "lucy.ply", "boot.ply", "teapot.ply", "spot.glb")
 
 
+SMALL_SCENE = """
+[camera]
+eye = [0.0, -5.0, 1.0]
+look_at = [0.0, 0.0, 0.0]
+width = 24
+height = 16
+
+[[object]]
+shape = "sphere"
+params = { segments = [16, 8] }
+[object.material]
+mirror = [0.9, 0.9, 0.9]
+
+[[object]]
+name = "thing"
+shape = "torus"
+params = { segments = [16, 8] }
+translate = [1.5, -1.5, 0.0]
+"""
+"""A mirror ball and a torus, 24 x 16 pixels."""
+
+
 @pytest.fixture
 def real_mesh() -> Callable[[str], ldtrefl.Mesh]:
     """Loads a mesh of LDTREFL_MESH_PATH; the test is skipped where it is missing."""
@@ -47,19 +68,6 @@ def real_mesh() -> Callable[[str], ldtrefl.Mesh]:
 def mesh_or_shape(real_mesh: Callable[[str], ldtrefl.Mesh]) -> Callable[[str], ldtrefl.Mesh]:
     """A procedural shape by name, or a real mesh by file name."""
     return lambda name: real_mesh(name) if "." in name else shapes.make(name)
-
-
-def rays_at(mesh: ldtrefl.Mesh, count: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
-    """(count, 3) float32 origins on a sphere about the mesh, and unit directions towards points of its box."""
-    rng = np.random.default_rng(seed)
-    centre, half = mesh.unit_frame
-    around = rng.normal(size=(count, 3))
-    around /= np.linalg.norm(around, axis=1, keepdims=True)
-    origins = (centre + 2.5 * half * around).astype(np.float32)
-    targets = rng.uniform(*mesh.bounds, size=(count, 3))
-    directions = targets - origins
-    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    return origins, directions.astype(np.float32)
 
 
 @pytest.fixture(autouse=True)

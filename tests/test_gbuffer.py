@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from stress_cases.pictures import camera_rays
 
 import ldtrefl
 from ldtrefl import launch, shapes
-from ldtrefl.camera import camera_axes
 from ldtrefl.device_scene import DeviceScene
 from ldtrefl.gbuffer import GBuffer, draw_gbuffer
 from ldtrefl.scene import Camera, Object, Scene
@@ -14,16 +14,6 @@ from ldtrefl.scene import Camera, Object, Scene
 def gbuffer(camera: Camera, *objects: Object) -> GBuffer:
     scene = Scene(camera=camera, objects=objects)
     return draw_gbuffer(DeviceScene(scene, launch.resolve_device(None)), camera)
-
-
-def camera_rays(camera: Camera) -> tuple[np.ndarray, np.ndarray]:
-    right, down, forward = camera_axes(camera)
-    half = np.tan(np.radians(camera.fov_y / 2))
-    x, y = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
-    across = (2 * x / camera.width - 1) * half * camera.width / camera.height
-    along = (2 * y / camera.height - 1) * half
-    rays = forward + across[..., None] * right + along[..., None] * down
-    return np.broadcast_to(camera.eye, (x.size, 3)).astype(np.float32), rays.reshape(-1, 3).astype(np.float32)
 
 
 CAMERAS = {

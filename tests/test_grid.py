@@ -5,20 +5,21 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 import warp as wp
+from stress_cases.judge import rays_about
 
 import ldtrefl
 from ldtrefl import launch, shapes
 from ldtrefl.cubemap import point_from_texel, texel_from_point
 from ldtrefl.ldt import LayeredDepthTexture
 
-from .conftest import REAL_MESHES, rays_at
+from .conftest import REAL_MESHES
 
 DENSE_KNOT = {"segments": [2000, 125]}
 
 
 def differences(mesh: ldtrefl.Mesh, maps: LayeredDepthTexture, count: int, seed: int) -> dict[str, float]:
     """Wrong hits and misses in percent of true hits, same triangle in percent of common hits, p99 in texels of 128."""
-    origins, directions = rays_at(mesh, count, seed)
+    origins, directions = rays_about(mesh, count, seed)
     hits = maps.trace(origins, directions)
     truth = ldtrefl.Raycaster(mesh.vertices, mesh.faces).trace(origins, directions)
     hit, true_hit = hits.triangle >= 0, truth.triangle >= 0
@@ -102,7 +103,7 @@ def test_patches_do_not_lose_what_is_thin_or_large() -> None:
 @pytest.mark.parametrize("quality", ["balanced", "exact", "fast"])
 def test_wires_of_a_fifth_of_a_texel_are_found(quality: str) -> None:
     mesh = shapes.make("wires", {"radius": 0.2 / 256})
-    origins, directions = rays_at(mesh, 300_000, 1)
+    origins, directions = rays_about(mesh, 300_000, 1)
     truth = ldtrefl.Raycaster(mesh.vertices, mesh.faces).trace(origins, directions).triangle >= 0
     found = ldtrefl.peel(mesh.vertices, mesh.faces, quality=quality).trace(origins, directions).triangle >= 0
     assert truth.sum() > 5000

@@ -10,25 +10,7 @@ import pytest
 import ldtrefl
 from ldtrefl.scene import Camera, Object, Scene
 
-GOOD = """
-[camera]
-eye = [0.0, -5.0, 1.0]
-look_at = [0.0, 0.0, 0.0]
-width = 24
-height = 16
-
-[[object]]
-shape = "sphere"
-params = { segments = [16, 8] }
-[object.material]
-mirror = [0.9, 0.9, 0.9]
-
-[[object]]
-name = "thing"
-shape = "torus"
-params = { segments = [16, 8] }
-translate = [1.5, -1.5, 0.0]
-"""
+from .conftest import SMALL_SCENE
 
 WRONG = [
     # (what is replaced, by what, what the message names)
@@ -67,9 +49,9 @@ WRONG = [
 
 @pytest.mark.parametrize(("old", "new", "message"), WRONG, ids=[new[:30] for _, new, _ in WRONG])
 def test_wrong_scene(tmp_path: Path, old: str, new: str, message: str) -> None:
-    assert old in GOOD
+    assert old in SMALL_SCENE
     path = tmp_path / "scene.toml"
-    path.write_text(GOOD.replace(old, new, 1))
+    path.write_text(SMALL_SCENE.replace(old, new, 1))
     with pytest.raises(ldtrefl.InputError, match=message) as caught:
         ldtrefl.render(ldtrefl.load_scene(path))
     assert "\n" not in str(caught.value)
@@ -93,7 +75,7 @@ def test_wrong_mesh_file(tmp_path: Path, name: str) -> None:
     content, message = MESHES[name]
     (tmp_path / name).write_bytes(content)
     scene = tmp_path / "scene.toml"
-    scene.write_text(GOOD.replace('shape = "torus"\nparams = { segments = [16, 8] }', f'mesh = "{name}"'))
+    scene.write_text(SMALL_SCENE.replace('shape = "torus"\nparams = { segments = [16, 8] }', f'mesh = "{name}"'))
     with pytest.raises(ldtrefl.InputError, match=message) as caught:
         ldtrefl.load_scene(scene)
     assert name in str(caught.value) and r"object[1].mesh" in str(caught.value)
@@ -150,13 +132,13 @@ def run(*arguments: object, folder: Path) -> subprocess.CompletedProcess:
 @pytest.fixture
 def scene_file(tmp_path: Path) -> Path:
     path = tmp_path / "scene.toml"
-    path.write_text(GOOD)
+    path.write_text(SMALL_SCENE)
     return path
 
 
 def test_command_line_refuses_in_one_line(scene_file: Path) -> None:
     folder = scene_file.parent
-    (folder / "bad.toml").write_text(GOOD.replace("eye = ", "eyee = "))
+    (folder / "bad.toml").write_text(SMALL_SCENE.replace("eye = ", "eyee = "))
     before = sorted(path.name for path in folder.iterdir())
     for arguments, message in [
         (("render", "none.toml"), "none.toml"),

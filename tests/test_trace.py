@@ -7,11 +7,12 @@ import pytest
 import warp as wp
 from embreex import rtcore_scene
 from embreex.mesh_construction import TriangleMesh
+from stress_cases.judge import rays_about
 
 import ldtrefl
 from ldtrefl import shapes
 
-from .conftest import REAL_MESHES, rays_at
+from .conftest import REAL_MESHES
 
 SHAPES = tuple(name for name in shapes.names())
 
@@ -24,7 +25,7 @@ LIMITS = dict.fromkeys([*SHAPES, *REAL_MESHES], (2.5, 0.1)) | {"wires": (25.0, 1
 def test_raycaster_agrees_with_embree(mesh_or_shape: Callable, name: str) -> None:
     mesh = mesh_or_shape(name)
     vertices, count = mesh.unit_vertices, 200_000
-    origins, directions = rays_at(ldtrefl.Mesh(vertices, mesh.faces), count)
+    origins, directions = rays_about(ldtrefl.Mesh(vertices, mesh.faces), count)
     embree = rtcore_scene.EmbreeScene(robust=True)
     TriangleMesh(embree, vertices[mesh.faces])
     truth = embree.run(origins, directions, output=1)
@@ -42,7 +43,7 @@ def test_raycaster_agrees_with_embree(mesh_or_shape: Callable, name: str) -> Non
 @pytest.mark.parametrize("name", [*SHAPES, *REAL_MESHES])
 def test_linear_search_agrees_with_the_raycaster(mesh_or_shape: Callable, name: str) -> None:
     mesh = mesh_or_shape(name)
-    origins, directions = rays_at(mesh, 20_000, seed=2)
+    origins, directions = rays_about(mesh, 20_000, seed=2)
     maps = ldtrefl.peel(mesh.vertices, mesh.faces, search="linear")
     hits = maps.trace(origins, directions, search="linear")
     truth = ldtrefl.Raycaster(mesh.vertices, mesh.faces).trace(origins, directions)
@@ -74,7 +75,7 @@ def all_tracers(mesh: ldtrefl.Mesh) -> list:
 
 
 def test_direction_length_scales_t() -> None:
-    origins, directions = rays_at(shapes.make("torus"), 2000)
+    origins, directions = rays_about(shapes.make("torus"), 2000)
     for tracer in all_tracers(shapes.make("torus")):
         unit = tracer.trace(origins, directions)
         for length in (1e-20, 1e-3, 7.0, 1e18):
@@ -122,14 +123,14 @@ def test_from_within_a_room_every_ray_hits_a_wall() -> None:
 
 def test_open_sheets_are_hit_from_both_sides_and_hollows_stay_hollow() -> None:
     mesh = shapes.make("bowl", {"closed": False})
-    origins, directions = rays_at(mesh, 20_000, seed=3)
+    origins, directions = rays_about(mesh, 20_000, seed=3)
     linear, exact, bvh = (tracer.trace(origins, directions).triangle >= 0 for tracer in all_tracers(mesh))
     assert (linear != bvh).sum() <= 0.02 * bvh.sum()
     assert (exact != bvh).sum() == 0
 
 
 def test_warp_arrays_in_warp_arrays_out() -> None:
-    origins, directions = rays_at(shapes.make("torus"), 100)
+    origins, directions = rays_about(shapes.make("torus"), 100)
     for tracer in all_tracers(shapes.make("torus")):
         expected = tracer.trace(origins, directions)
         hits = tracer.trace(*(wp.array(x, dtype=wp.vec3, device="cpu") for x in (origins, directions)))
@@ -139,7 +140,7 @@ def test_warp_arrays_in_warp_arrays_out() -> None:
 
 def test_barycentrics_and_normal_are_the_hit_triangles() -> None:
     mesh = shapes.make("genus3", {"grid": 32})
-    origins, directions = rays_at(mesh, 2000)
+    origins, directions = rays_about(mesh, 2000)
     hits = ldtrefl.Raycaster(mesh.vertices, mesh.faces).trace(origins, directions)
     hit = hits.triangle >= 0
     a, b, c = np.moveaxis(mesh.vertices[mesh.faces[hits.triangle[hit]]], 1, 0)

@@ -72,9 +72,9 @@ LINEAR = Limit(
 class Outcome:
     """What a case measured for one tracer."""
 
-    case: str
-    what: str
-    by: str
+    case: str = ""
+    what: str = ""
+    by: str = ""
     tried: int = 0
     wrong_hits: int = 0
     wrong_misses: int = 0
@@ -123,14 +123,18 @@ class Truth:
 
     def __init__(self, mesh: ldtrefl.Mesh, *, always_embree: bool = False) -> None:
         self.mesh = mesh
-        self.is_brute = not always_embree and len(mesh.faces) <= BRUTE_TRIANGLES
         self.centre, self.half = mesh.unit_frame
         corners = ((mesh.vertices - self.centre) / self.half)[mesh.faces]
         self._a, self._u, self._v = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
         self._embree = None
-        if not self.is_brute:
+        if always_embree or len(mesh.faces) > BRUTE_TRIANGLES:
             self._embree = rtcore_scene.EmbreeScene(robust=True)
             self._geometry = TriangleMesh(self._embree, mesh.unit_vertices, mesh.faces)
+
+    @property
+    def is_brute(self) -> bool:
+        """Whether the answers are brute force's."""
+        return self._embree is None
 
     def hits(self, origins: np.ndarray, directions: np.ndarray) -> np.ndarray:
         """(n,) float64 distances in lengths of each direction, +inf on a miss; origins and directions (n, 3)."""
@@ -146,7 +150,7 @@ class Truth:
         # Start near the object: a float32 ray tracer cannot start far away, and brute force loses nothing.
         skipped = np.maximum(-(o * d).sum(axis=1) - 2.0, 0.0)
         o = o + skipped[:, None] * d
-        t, triangle = self._by_embree(o, d) if self._embree is not None else self._by_force(o, d)
+        t, triangle = self._by_force(o, d) if self.is_brute else self._by_embree(o, d)
         return (t + skipped) * self.half / length[:, 0], triangle
 
     def _by_embree(self, o: np.ndarray, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -234,9 +238,6 @@ def judge(
         radius = max(radius, found)
         defects += found > limit.radius
     outcome = Outcome(
-        "",
-        "",
-        "",
         tried=len(t),
         wrong_hits=int((hit & ~true).sum()),
         wrong_misses=int((true & ~hit).sum()),
@@ -302,15 +303,16 @@ def describe(limit: Limit) -> str:
     return ", ".join(parts) + (f" ({limit.why})" if limit.why else "")
 
 
-def rays_about(mesh: ldtrefl.Mesh, count: int, seed: int, reach: float = 2.5) -> tuple[np.ndarray, np.ndarray]:
-    """(count, 3) float32 origins on a sphere about the mesh and directions towards points of its box."""
+def rays_about(mesh: ldtrefl.Mesh, count: int, seed: int = 0, reach: float = 2.5) -> tuple[np.ndarray, np.ndarray]:
+    """(count, 3) float32 origins on a sphere about the mesh, and unit directions towards points of its box."""
     rng = np.random.default_rng(seed)
     centre, half = mesh.unit_frame
     around = rng.normal(size=(count, 3))
     around /= np.linalg.norm(around, axis=1, keepdims=True)
     origins = (centre + reach * half * around).astype(np.float32)
-    targets = rng.uniform(mesh.bounds[0], mesh.bounds[1], (count, 3))
-    return origins, ((targets - origins) / (reach * half)).astype(np.float32)
+    directions = rng.uniform(mesh.bounds[0], mesh.bounds[1], (count, 3)) - origins
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    return origins, directions.astype(np.float32)
 
 
 def moved(mesh: ldtrefl.Mesh, scale: object = 1.0, offset: object = 0.0) -> ldtrefl.Mesh:

@@ -50,6 +50,17 @@ def judge_same_pictures(
     return outcomes
 
 
+def camera_rays(camera: ldtrefl.Camera) -> tuple[np.ndarray, np.ndarray]:
+    """(h * w, 3) float64 origins and directions through the pixels' centres."""
+    right, down, forward = camera_axes(camera)
+    half = np.tan(np.radians(camera.fov_y / 2))
+    x, y = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
+    across = (2 * x / camera.width - 1) * half * camera.width / camera.height
+    along = (2 * y / camera.height - 1) * half
+    rays = forward + across[..., None] * right + along[..., None] * down
+    return np.broadcast_to(np.asarray(camera.eye, float), (x.size, 3)), rays.reshape(-1, 3)
+
+
 class Reference:
     """Primary and reflected rays of a scene, made in float64 and followed by Embree: no rasteriser, no map."""
 
@@ -60,17 +71,6 @@ class Reference:
             matrix, mesh = entry.world_from_object(), entry.geometry
             meshes.append(ldtrefl.Mesh(mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3], mesh.faces))
         self.truths = [Truth(mesh, always_embree=True) for mesh in meshes]
-
-    def camera_rays(self) -> tuple[np.ndarray, np.ndarray]:
-        """(h * w, 3) float64 origins and directions through the pixels' centres."""
-        camera = self.scene.camera
-        right, down, forward = camera_axes(camera)
-        half = np.tan(np.radians(camera.fov_y / 2))
-        x, y = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
-        across = (2 * x / camera.width - 1) * half * camera.width / camera.height
-        along = (2 * y / camera.height - 1) * half
-        rays = forward + across[..., None] * right + along[..., None] * down
-        return np.broadcast_to(np.asarray(camera.eye, float), (x.size, 3)), rays.reshape(-1, 3)
 
     def first(self, o: np.ndarray, d: np.ndarray, without: np.ndarray | None = None) -> tuple[np.ndarray, ...]:
         """(t, object, triangle) of the first hits; ``without`` holds an object per ray that is not looked for."""
@@ -111,7 +111,7 @@ class Reference:
         """(h, w) arrays: object seen, distance of the reflected ray's hit, and the object hit."""
         camera = self.scene.camera
         shape = camera.height, camera.width
-        o, d = self.camera_rays()
+        o, d = camera_rays(camera)
         t, seen, triangle = self.first(o, d)
         distance, hit = np.full(len(o), np.inf), np.full(len(o), -1)
         for k, entry in enumerate(self.scene.objects):
