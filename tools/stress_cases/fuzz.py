@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 import ldtrefl
 from ldtrefl import shapes
-from ldtrefl.grid_build import Quality
+from ldtrefl.grid_build import FEW_TRIANGLES, Quality
 
-from .judge import Limit, Outcome, Truth, describe, judge, moved
+from .judge import DENSE, TEXELS, Limit, Outcome, Truth, describe, judge, moved
 
 NAME = "11 fuzz"
 RAYS = (1000, 5000)
@@ -135,7 +135,7 @@ def run(rays: int, pictures: int) -> list[Outcome]:
                 hits = maps.trace(origins, directions, search=search)
             if by != "linear":
                 true_t = corrected(truth, origins, directions, true_t, hits)
-            outcome = judge(truth, origins, directions, true_t, hits, limit_of(by, mesh))
+            outcome = judge(truth, origins, directions, true_t, hits, limit_of(by, mesh, resolution))
             total = totals[by]
             total.tried += outcome.tried
             total.wrong_hits += outcome.wrong_hits
@@ -155,7 +155,7 @@ def run(rays: int, pictures: int) -> list[Outcome]:
     return list(totals.values())
 
 
-def limit_of(by: str, mesh: ldtrefl.Mesh | None) -> Limit:
+def limit_of(by: str, mesh: ldtrefl.Mesh | None, resolution: int = TEXELS) -> Limit:
     """What a tracer is held to on a mesh."""
     if by == "linear":
         return Limit(
@@ -163,7 +163,9 @@ def limit_of(by: str, mesh: ldtrefl.Mesh | None) -> Limit:
             defects=False,
             why="no limit but finite answers: resolutions from 16, stretched and thin meshes",
         )
-    if mesh is not None and len(mesh.faces) > 50_000 and by in ("balanced", "fast"):
+    if mesh is not None and len(mesh.faces) > FEW_TRIANGLES and by in ("balanced", "fast"):
+        if resolution >= TEXELS:
+            return DENSE[by]
         # A texel of the map may be 16 of the 256 that are counted in.
         return Limit(
             radius=np.inf, p999=np.inf, wrong=60.0 if by == "fast" else 25.0, why="patches of maps from 16 texels"
