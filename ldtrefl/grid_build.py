@@ -47,6 +47,8 @@ ROUNDING = wp.constant(1.5e-7)
 """Of a ray's coordinates in cells, relative to the grid's size: two roundings of a float32."""
 THINNEST = wp.constant(6.0e-7)
 """Height, in unit space, below which a triangle has no area: it is ten roundings of its corners, its normal chance."""
+MASK_BITS = wp.constant(64)
+"""Cells of an item's box up to which it is kept which of them it touches: that is the dearest thing to find out."""
 LARGEST_LEAP = wp.constant(250)
 """Bricks: what fits in a byte, and more than a grid has."""
 
@@ -153,56 +155,86 @@ def touches_cell(piece: Piece, x: int, y: int, z: int) -> bool:
     return piece.kind > TRIANGLE or not edges_are_apart(piece.edge_v - piece.edge_u, local, half)
 
 
+@wp.func
+def item_number(target: GridTarget, items: wp.array(dtype=wp.int32), i: int) -> int:
+    """The ``i``-th item: of those listed; else of all patches; else of all triangles."""
+    if items.shape[0] > 0:
+        return items[i]
+    return wp.where(target.patches.shape[0] > 0, -1 - i, i)
+
+
+@wp.func
+def fits_mask(box: CellBox) -> bool:
+    """Whether a box has no more cells than a mask has bits."""
+    n = box.last - box.first + wp.vec3i(1)
+    return wp.int64(n[0]) * wp.int64(n[1]) * wp.int64(n[2]) <= wp.int64(MASK_BITS)
+
+
 @launch.kernel
 def find_cells(
     first: int,
     # In:
     target: GridTarget,
     items: wp.array(dtype=wp.int32),
-    places: wp.array(dtype=wp.int32),
-    is_counting: int,
     # Out:
     counts_out: wp.array(dtype=wp.int32),
+    masks_out: wp.array(dtype=wp.uint64),  # bit k: the item touches cell k of its box; of small boxes only
+):
+    i = first + wp.tid()
+    piece = piece_of(target, item_number(target, items, i))
+    box = cells_touched(target, piece)
+    is_one_cell = box.first == box.last
+    is_masked = fits_mask(box)
+    count = int(0)
+    mask = wp.uint64(0)
+    bit = wp.uint64(1)
+    for z in range(box.first[2], box.last[2] + 1):
+        for y in range(box.first[1], box.last[1] + 1):
+            for x in range(box.first[0], box.last[0] + 1):
+                if is_one_cell or touches_cell(piece, x, y, z):
+                    count += 1
+                    if is_masked:
+                        mask = mask | bit
+                bit = bit << wp.uint64(1)
+    counts_out[i] = count
+    masks_out[i] = mask
+
+
+@launch.kernel
+def list_cells(
+    first: int,
+    # In:
+    target: GridTarget,
+    items: wp.array(dtype=wp.int32),
+    masks: wp.array(dtype=wp.uint64),
+    places: wp.array(dtype=wp.int32),
+    # Out:
     cell_out: wp.array(dtype=wp.int32),
     item_out: wp.array(dtype=wp.int32),
     touched_out: wp.array(dtype=wp.uint8),  # 1 for cells with a pair: the same value from whoever writes
 ):
     i = first + wp.tid()
-    item = int(i)
-    if items.shape[0] > 0:
-        item = items[i]
-    elif target.patches.shape[0] > 0:
-        item = -1 - i
-    place = int(0)
-    end = int(0)
-    if is_counting == 0:
-        place = places[i]
-        end = places[i + 1]
-        if place == end:
-            return
+    place = int(places[i])
+    if place == places[i + 1]:
+        return
+    item = item_number(target, items, i)
     piece = piece_of(target, item)
-    count = int(0)
     box = cells_touched(target, piece)
-    if box.first == box.last:
-        count = 1
-        if is_counting == 0:
-            cell = number_of_cell(target.bricks, box.first[0], box.first[1], box.first[2])
-            cell_out[place] = cell
-            item_out[place] = item
-            touched_out[cell] = wp.uint8(1)
-    else:
-        for z in range(box.first[2], box.last[2] + 1):
-            for y in range(box.first[1], box.last[1] + 1):
-                for x in range(box.first[0], box.last[0] + 1):
-                    if touches_cell(piece, x, y, z):
-                        if is_counting == 0:
-                            cell = number_of_cell(target.bricks, x, y, z)
-                            cell_out[place + count] = cell
-                            item_out[place + count] = item
-                            touched_out[cell] = wp.uint8(1)
-                        count += 1
-    if is_counting != 0:
-        counts_out[i] = count
+    is_masked = fits_mask(box)
+    mask = masks[i]
+    for z in range(box.first[2], box.last[2] + 1):
+        for y in range(box.first[1], box.last[1] + 1):
+            for x in range(box.first[0], box.last[0] + 1):
+                is_touched = (mask & wp.uint64(1)) != wp.uint64(0)
+                if not is_masked:
+                    is_touched = touches_cell(piece, x, y, z)
+                if is_touched:
+                    cell = number_of_cell(target.bricks, x, y, z)
+                    cell_out[place] = cell
+                    item_out[place] = item
+                    touched_out[cell] = wp.uint8(1)
+                    place += 1
+                mask = mask >> wp.uint64(1)
 
 
 @launch.kernel
@@ -413,13 +445,12 @@ def _cells_of(
     all patches, or of all triangles where there are none."""
     listed = wp.empty(0, dtype=wp.int32, device=device) if items is None else items
     counts = wp.zeros(count + 1, dtype=wp.int32, device=device)
-    nothing = wp.empty(0, dtype=wp.int32, device=device)
-    touched = wp.zeros(_brick_count(target) * int(CELLS), dtype=wp.uint8, device=device)
-    inputs = [target, listed]
-    launch.launch(find_cells, count, [*inputs, nothing, 1, counts, nothing, nothing, touched], device)
+    masks = wp.empty(count, dtype=wp.uint64, device=device)
+    launch.launch(find_cells, count, [target, listed, counts, masks], device)
     places, total = exclusive_scan(counts)
     cell, item = (wp.empty(total, dtype=wp.int32, device=device) for _ in range(2))
-    launch.launch(find_cells, count, [*inputs, places, 0, nothing, cell, item, touched], device)
+    touched = wp.zeros(_brick_count(target) * int(CELLS), dtype=wp.uint8, device=device)
+    launch.launch(list_cells, count, [target, listed, masks, places, cell, item, touched], device)
     return cell, item, touched
 
 
