@@ -161,7 +161,7 @@ def peel(
     launch.set_threads(threads)
     path = None if output is None else check_writable(output)
     target = launch.resolve_device(device)
-    geometry = DeviceMesh.upload(_mesh_or_shape(mesh), target)
+    geometry = DeviceMesh(_mesh_or_shape(mesh), target)
     peel_mesh(geometry, 16, search="linear")  # compiles the kernels, so that the time below is peeling's own
     start = time.perf_counter()
     maps = peel_mesh(geometry, resolution, search="linear")
@@ -244,12 +244,16 @@ def _in_words(counters: dict[str, int]) -> list[str]:
     if n["triangles_tested"]:
         share = 100.0 * n["triangles_culled"] / n["triangles_tested"]
         lines.append(
-            f"{n['triangles_culled']} of {n['triangles_tested']} pairs of triangle and object culled ({share:.0f}%)"
+            f"{n['triangles_culled']} of {n['triangles_tested']} reflector triangles out of sight or without an object "
+            f"in their reflection ({share:.0f}%)"
         )
-    if n["rays_saved"]:
-        lines.append(f"{n['rays_saved']} searches of a ray for an object saved by culling")
-    per_ray = f", {n['steps'] / n['rays']:.1f} steps each" if n["rays"] and n["steps"] else ""
-    lines.append(f"{n['rays']} rays reflected{per_ray}")
+    lines.append(f"{n['rays']} rays reflected")
+    pairs = n["searches"] + n["searches_saved"]
+    if pairs:
+        share = 100.0 * n["searches_saved"] / pairs
+        lines.append(f"{n['searches_saved']} of {pairs} pairs of ray and object not searched ({share:.0f}%)")
+    if n["searches"] and n["steps"]:
+        lines.append(f"{n['searches']} searches, {n['steps'] / n['searches']:.1f} steps each")
     made = [f"{n['objects_peeled']} objects peeled"]
     made += [f"{n['objects_from_cache']} from the cache"] if n["objects_from_cache"] else []
     made += [f"{n['objects_skipped']} not needed"] if n["objects_skipped"] else []
@@ -384,7 +388,7 @@ def _mesh_info(mesh: Mesh) -> None:
     console.print(f"{len(mesh.faces)} triangles, {len(mesh.vertices)} vertices")
     console.print(f"from {low.tolist()} to {high.tolist()}")
     console.print(f"parts: {len(mesh.parts)}, textures: {textures}, UVs: {'no' if mesh.uvs is None else 'yes'}")
-    maps = peel_mesh(DeviceMesh.upload(mesh, launch.resolve_device(None)), 128, search="linear")
+    maps = peel_mesh(DeviceMesh(mesh, launch.resolve_device(None)), 128, search="linear")
     crossings = ", ".join(f"{axis} {count}" for axis, count in maps.crossings().items())
     console.print(f"surfaces over one texel at 128: {crossings}")
     odd = sum(int((maps.counts(axis) % 2).sum()) for axis in range(3))

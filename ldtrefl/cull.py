@@ -1,39 +1,35 @@
-"""Reflection regions: which objects each triangle of a reflector can show.
+"""Reflection regions: which objects each reflected ray can meet.
 
-``flat`` is the test of Zhang, Hsieh and Shen, section 3.2: the object's bounding sphere is mirrored in the triangle's
-plane; the triangle is kept if it overlaps the cone from the camera about the mirrored sphere: a corner inside, an edge
-crossing, or the whole ellipse inside the triangle. It takes the reflector for flat triangles, so with interpolated
-normals it drops pixels that do reflect.
+``safe``, the default, looks at the rays themselves, of any bounce. Rays come in runs that stand together on the screen
+(``rays.py``): the origins of a run lie in a ball, its directions in a cone. An object whose bounding sphere no ray of
+such a cone can meet is dropped for all of them at once; one that is left is kept if a ray of the run does meet the
+sphere. So nothing is lost, whatever the normals, and the cost follows the pixels, not the reflector's triangles.
 
-``safe`` never does: the triangle's normals lie in a cone, so do the directions from the eye to it, hence the reflected
-directions; the triangle is dropped only if no ray of that cone, from anywhere on the triangle, meets the sphere.
+``flat`` is the test of Zhang, Hsieh and Shen, section 3.2, on each triangle of the reflector: the object's bounding
+sphere is mirrored in the triangle's plane; the triangle is kept if it overlaps the cone from the camera about the
+mirrored sphere: a corner inside, an edge crossing, or the whole ellipse inside the triangle. It takes the reflector for
+flat triangles, so with interpolated normals it drops pixels that do reflect. Later bounces are not culled.
 
-All in device space. A triangle's answer is a row of bits, one per object.
+All in device space.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import warp as wp
 
 from ldtrefl import launch
-from ldtrefl.device_scene import ObjectRecord
+from ldtrefl.device_scene import DeviceScene, ObjectRecord
 from ldtrefl.gbuffer import GBuffer
+from ldtrefl.rays import RUN, RayBuffer, Regions, meets_sphere
 
-CullTest = Literal["safe", "flat", "none"]
+CullTest = Literal["safe", "flat"]
 
-FLAT = wp.constant(0)
-SAFE = wp.constant(1)
-
-WIDEST_NORMALS = wp.constant(1.4)
-"""Radians between a triangle's mean normal and a corner's beyond which nothing is concluded (an interpolated normal
-can then pass near zero and turn anywhere)."""
-
-ANGLE_SLACK = wp.constant(2.0e-3)
-"""Radians added to every cone of ``safe``: float32 dot products give angles near 0 to about 5e-4."""
+COSINE_SLACK = wp.constant(1.0e-5)
+"""By which cones are widened: a hundred roundings of a float32 dot product."""
 
 
 @wp.func
@@ -101,81 +97,93 @@ def shows_flat(eye: wp.vec3, a: wp.vec3, b: wp.vec3, c: wp.vec3, centre: wp.vec3
     return edge_meets_cone(eye, axis, cosine, c, a) or axis_meets_triangle(eye, axis, a, b, c)
 
 
-@wp.func
-def angle_between(a: wp.vec3, b: wp.vec3) -> float:
-    """Radians between two unit vectors."""
-    return wp.acos(wp.clamp(wp.dot(a, b), -1.0, 1.0))
-
-
 @wp.struct
-class MirrorTriangle:
-    """A triangle of a reflector and the shading normals at its corners (the facet's if it is not smooth)."""
+class RunBounds:
+    """A ball about the origins of some rays, and a cone about their directions."""
 
-    a: wp.vec3
-    b: wp.vec3
-    c: wp.vec3
-    normal_a: wp.vec3
-    normal_b: wp.vec3
-    normal_c: wp.vec3
+    middle: wp.vec3
+    reach: float
+    axis: wp.vec3
+    cosine: float  # of the cone's half-angle; -1 if nothing is known
 
 
 @wp.func
-def shows_safe(eye: wp.vec3, mirror: MirrorTriangle, centre: wp.vec3, radius: float) -> bool:
-    """Whether a ray reflected at the triangle may meet the sphere; False only if none can."""
-    # The triangle lies in a ball about its centre, seen from the eye within a cone.
-    middle = (mirror.a + mirror.b + mirror.c) / 3.0
-    reach = wp.max(wp.length(mirror.a - middle), wp.max(wp.length(mirror.b - middle), wp.length(mirror.c - middle)))
-    view = middle - eye
-    distance = wp.length(view)
-    if distance <= reach:
-        return True
-    view = view / distance
-    view_spread = wp.asin(reach / distance)
+def bounds_of_run(rays: RayBuffer, begin: int, end: int) -> RunBounds:
+    """The bounds of the rays from ``begin`` to ``end`` that are alive."""
+    middle = wp.vec3(0.0)
+    axis = wp.vec3(0.0)
+    alive = int(0)
+    for i in range(begin, end):
+        if rays.source[i] >= 0:
+            middle += rays.origin[i]
+            axis += rays.direction[i]
+            alive += 1
+    bounds = RunBounds()
+    bounds.middle = middle / float(wp.max(alive, 1))
+    bounds.axis = wp.normalize(axis)
+    bounds.cosine = 1.0
+    for i in range(begin, end):
+        if rays.source[i] >= 0:
+            bounds.reach = wp.max(bounds.reach, wp.length(rays.origin[i] - bounds.middle))
+            bounds.cosine = wp.min(bounds.cosine, wp.dot(rays.direction[i], bounds.axis))
+    bounds.cosine = wp.max(bounds.cosine - COSINE_SLACK, -1.0)
+    return bounds
 
-    # Its normals lie in a cone about their mean.
-    mean = mirror.normal_a + mirror.normal_b + mirror.normal_c
-    if not wp.length(mean) > 0.5:
-        return True
-    mean = wp.normalize(mean)
-    normal_spread = wp.max(
-        angle_between(mean, mirror.normal_a),
-        wp.max(angle_between(mean, mirror.normal_b), angle_between(mean, mirror.normal_c)),
-    )
-    if not normal_spread < WIDEST_NORMALS:
-        return True
 
-    # A turn of the normal turns the reflected ray twice as far. Moving all rays to the centre widens the sphere.
-    reflected = view - 2.0 * wp.dot(view, mean) * mean
-    spread = view_spread + 2.0 * normal_spread + ANGLE_SLACK
-    towards = centre - middle
+@wp.func
+def may_meet(bounds: RunBounds, centre: wp.vec3, radius: float) -> bool:
+    """Whether a ray from the ball along a direction of the cone may meet a sphere; False only if none can."""
+    # To move all rays to the ball's middle widens the sphere.
+    towards = centre - bounds.middle
     apart = wp.length(towards)
-    widened = radius + reach
-    if apart <= widened:
+    widened = radius + bounds.reach
+    if apart <= widened or bounds.cosine <= 0.0:
         return True
-    return angle_between(wp.normalize(reflected), towards / apart) <= spread + wp.asin(widened / apart)
+    # The angle between the axis and the sphere's centre is at most the cone's half-angle and the sphere's together.
+    sphere_sine = widened / apart
+    sphere_cosine = wp.sqrt(1.0 - sphere_sine * sphere_sine)
+    sine = wp.sqrt(1.0 - bounds.cosine * bounds.cosine)
+    least = bounds.cosine * sphere_cosine - sine * sphere_sine
+    return wp.dot(bounds.axis, towards) >= (least - COSINE_SLACK) * apart
 
 
-@wp.func
-def mirror_normal(record: ObjectRecord, vertex: int, facet: wp.vec3) -> wp.vec3:
-    """The shading normal at a corner; a corner without one spoils the cone, which is then given up."""
-    if record.smooth == 0:
-        return facet
-    return wp.normalize(record.normal_from_unit * wp.normalize(record.normals[vertex]))
-
-
-@wp.func
-def mirror_triangle(record: ObjectRecord, triangle: int) -> MirrorTriangle:
-    """A reflector's triangle in device space."""
-    corners = record.faces[triangle]
-    mirror = MirrorTriangle()
-    mirror.a = wp.transform_point(record.device_from_unit, record.vertices[corners[0]])
-    mirror.b = wp.transform_point(record.device_from_unit, record.vertices[corners[1]])
-    mirror.c = wp.transform_point(record.device_from_unit, record.vertices[corners[2]])
-    facet = wp.normalize(wp.cross(mirror.b - mirror.a, mirror.c - mirror.a))
-    mirror.normal_a = mirror_normal(record, corners[0], facet)
-    mirror.normal_b = mirror_normal(record, corners[1], facet)
-    mirror.normal_c = mirror_normal(record, corners[2], facet)
-    return mirror
+@launch.kernel
+def cull_runs(
+    first: int,
+    # In:
+    rays: RayBuffer,
+    objects: wp.array(dtype=ObjectRecord),
+    pixel_triangle: wp.array(dtype=wp.int32),
+    first_rows: wp.array(dtype=wp.int32),
+    # Out: bit k % 32 of word k / 32 is set if a ray of the run meets the sphere of object k
+    bits_out: wp.array2d(dtype=wp.uint32),
+    # Out, if it is not empty: 1 for triangles of reflectors in a run that shows an object, the same from whoever writes
+    kept_out: wp.array(dtype=wp.uint8),
+):
+    run = first + wp.tid()
+    begin, end = RUN * run, wp.min(RUN * run + RUN, rays.source.shape[0])
+    bounds = bounds_of_run(rays, begin, end)
+    shows_any = bool(False)
+    for word in range(bits_out.shape[1]):
+        bits = wp.uint32(0)
+        for k in range(32 * word, wp.min(32 * word + 32, objects.shape[0])):
+            centre, radius = objects[k].centre, objects[k].radius
+            if may_meet(bounds, centre, radius):
+                i = int(begin)
+                while i < end:
+                    if (
+                        rays.source[i] >= 0
+                        and rays.source[i] != k
+                        and meets_sphere(rays.origin[i], rays.direction[i], centre, radius)
+                    ):
+                        bits = bits | (wp.uint32(1) << wp.uint32(k % 32))
+                        i = end
+                    i += 1
+        bits_out[run, word] = bits
+        shows_any = shows_any or bits != wp.uint32(0)
+    if shows_any and kept_out.shape[0] > 0:
+        for i in range(begin, end):
+            kept_out[first_rows[rays.source[i]] + pixel_triangle[rays.pixel[i]]] = wp.uint8(1)
 
 
 @launch.kernel
@@ -186,78 +194,95 @@ def cull_triangles(
     reflector: int,
     first_row: int,
     eye: wp.vec3,
-    test: int,
     # Out: bit k % 32 of word k / 32 is set if the triangle can show object k
     bits_out: wp.array2d(dtype=wp.uint32),
 ):
     triangle = first + wp.tid()
-    mirror = mirror_triangle(objects[reflector], triangle)
+    corners = objects[reflector].faces[triangle]
+    device_from_unit = objects[reflector].device_from_unit
+    a = wp.transform_point(device_from_unit, objects[reflector].vertices[corners[0]])
+    b = wp.transform_point(device_from_unit, objects[reflector].vertices[corners[1]])
+    c = wp.transform_point(device_from_unit, objects[reflector].vertices[corners[2]])
     for k in range(objects.shape[0]):
-        if k != reflector:
-            kept = bool(False)
-            if test == FLAT:
-                kept = shows_flat(eye, mirror.a, mirror.b, mirror.c, objects[k].centre, objects[k].radius)
-            else:
-                kept = shows_safe(eye, mirror, objects[k].centre, objects[k].radius)
-            if kept:
-                word = bits_out[first_row + triangle, k / 32]
-                bits_out[first_row + triangle, k / 32] = word | (wp.uint32(1) << wp.uint32(k % 32))
+        if k != reflector and shows_flat(eye, a, b, c, objects[k].centre, objects[k].radius):
+            word = bits_out[first_row + triangle, k / 32]
+            bits_out[first_row + triangle, k / 32] = word | (wp.uint32(1) << wp.uint32(k % 32))
+
+
+@launch.kernel
+def find_rows(
+    first: int,
+    # In:
+    rays: RayBuffer,
+    pixel_triangle: wp.array(dtype=wp.int32),
+    first_rows: wp.array(dtype=wp.int32),
+    # Out:
+    rows_out: wp.array(dtype=wp.int32),
+):
+    i = first + wp.tid()
+    rows_out[i] = first_rows[rays.source[i]] + pixel_triangle[rays.pixel[i]]
 
 
 @dataclass(frozen=True, eq=False)
-class ReflectionRegions:
-    """Which objects each reflector triangle can show."""
+class Culled:
+    """What is left for each ray."""
 
-    bits: wp.array
-    """(reflector triangles, words) uint32."""
-    first_rows: wp.array
-    """(objects,) int32: row of each object's first triangle; -1 for what is no reflector."""
+    regions: Any
+    """The ``Regions``."""
     shown: set[int]
-    """Objects that at least one visible pixel's triangle can show."""
+    """Objects that at least one ray can meet."""
 
 
-@wp.func
-def can_show(bits: wp.array2d(dtype=wp.uint32), row: int, index: int) -> bool:
-    """Whether the triangle of this row can show object ``index``; row -1 can show all."""
-    if row < 0:
-        return True
-    return ((bits[row, index / 32] >> wp.uint32(index % 32)) & wp.uint32(1)) != wp.uint32(0)
+def not_culled(scene: DeviceScene) -> Culled:
+    """Every ray may meet every object."""
+    regions = Regions()
+    regions.bits = wp.empty((0, 0), dtype=wp.uint32, device=scene.device)
+    regions.rows = wp.empty(0, dtype=wp.int32, device=scene.device)
+    return Culled(regions, {entry.index for entry in scene.objects})
 
 
-def find_regions(gbuffer: GBuffer, test: CullTest, stats: launch.Stats) -> ReflectionRegions:
-    """Test every reflector triangle against every object.
+def cull_rays(gbuffer: GBuffer, rays: Any, bounce: int, test: CullTest, stats: launch.Stats) -> Culled:
+    """Test the rays of a bounce, 0 the first.
 
-    Counts ``triangles_tested`` and ``triangles_culled`` (pairs of triangle and object), and ``rays_saved`` (pairs of
-    reflected ray and object that need no search).
+    Counts ``triangles_tested``, those of all reflectors, and ``triangles_culled``, those that are not seen or that none
+    of the objects can be seen in.
     """
-    scene = gbuffer.scene
-    device, count = scene.device, len(scene.objects)
-    rows = np.full(count, -1, np.int32)
-    if test == "none":
-        seen = set(np.unique(gbuffer.objects[gbuffer.reflector_mask]).tolist())
-        # The only reflector in sight does not show itself.
-        shown = {entry.index for entry in scene.objects if seen - {entry.index}}
-        empty = wp.zeros((1, 1), dtype=wp.uint32, device=device)
-        return ReflectionRegions(empty, wp.array(rows, dtype=wp.int32, device=device), shown)
-    total = 0
-    for entry in scene.reflectors:
-        rows[entry.index] = total
-        total += len(entry.geometry.faces)
-    bits = wp.zeros((max(total, 1), (count + 31) // 32), dtype=wp.uint32, device=device)
-    code = int(FLAT if test == "flat" else SAFE)
-    for entry in scene.reflectors:
-        inputs = [scene.records, entry.index, int(rows[entry.index]), gbuffer.view.camera.eye, code, bits]
-        launch.launch(cull_triangles, len(entry.geometry.faces), inputs, device)
+    if test == "flat":
+        return _flat(gbuffer, rays, stats) if bounce == 0 else not_culled(gbuffer.scene)
+    scene, device = gbuffer.scene, gbuffer.scene.device
+    regions = Regions()
+    runs, words = -(-rays.source.shape[0] // int(RUN)), -(-len(scene.objects) // 32)
+    regions.bits = wp.empty((runs, words), dtype=wp.uint32, device=device)
+    regions.rows = wp.empty(0, dtype=wp.int32, device=device)
+    first_rows, total = scene.reflector_rows
+    kept = wp.zeros(total if bounce == 0 else 0, dtype=wp.uint8, device=device)
+    inputs = [rays, scene.records, gbuffer.view.triangle, first_rows, regions.bits, kept]
+    launch.launch(cull_runs, runs, inputs, device)
+    if bounce == 0:
+        stats.count("triangles_tested", total)
+        stats.count("triangles_culled", total - int(np.count_nonzero(kept.numpy())))
+    return Culled(regions, _objects_in(regions.bits.numpy(), len(scene.objects)))
 
-    # Count, and find the objects that some visible pixel may show.
-    table = bits.numpy()
-    kept = int(np.bitwise_count(table).sum(dtype=np.int64))
-    tested = total * (count - 1)
-    stats.count("triangles_tested", tested)
-    stats.count("triangles_culled", tested - kept)
-    mask = gbuffer.reflector_mask
-    visible = table[rows[gbuffer.objects[mask]] + gbuffer.triangles[mask]]
-    stats.count("rays_saved", len(visible) * (count - 1) - int(np.bitwise_count(visible).sum(dtype=np.int64)))
-    union = np.bitwise_or.reduce(visible, axis=0) if len(visible) else np.zeros(bits.shape[1], np.uint32)
-    shown = {k for k in range(count) if union[k // 32] >> np.uint32(k % 32) & np.uint32(1)}
-    return ReflectionRegions(bits, wp.array(rows, dtype=wp.int32, device=device), shown)
+
+def _flat(gbuffer: GBuffer, rays: Any, stats: launch.Stats) -> Culled:
+    scene, device, count = gbuffer.scene, gbuffer.scene.device, len(gbuffer.scene.objects)
+    first_rows, total = scene.reflector_rows
+    regions = Regions()
+    regions.bits = wp.zeros((total, -(-count // 32)), dtype=wp.uint32, device=device)
+    for entry, first_row in zip(scene.objects, first_rows.numpy().tolist(), strict=True):
+        if entry.source.is_reflector:
+            inputs = [scene.records, entry.index, first_row, gbuffer.view.camera.eye, regions.bits]
+            launch.launch(cull_triangles, len(entry.geometry.faces), inputs, device)
+    n = rays.source.shape[0]
+    regions.rows = wp.empty(n, dtype=wp.int32, device=device)
+    launch.launch(find_rows, n, [rays, gbuffer.view.triangle, first_rows, regions.rows], device)
+    table = regions.bits.numpy()
+    stats.count("triangles_tested", total)
+    stats.count("triangles_culled", int((~table.any(axis=1)).sum()))
+    return Culled(regions, _objects_in(table[regions.rows.numpy()], count))
+
+
+def _objects_in(table: np.ndarray, count: int) -> set[int]:
+    """Objects whose bit is set in any row."""
+    union = np.bitwise_or.reduce(table, axis=0)
+    return {k for k in range(count) if union[k // 32] >> np.uint32(k % 32) & np.uint32(1)}

@@ -9,6 +9,7 @@ composed in float64. Objects with the same mesh share its arrays: a moved object
 from __future__ import annotations
 
 import dataclasses
+import functools
 from typing import Any
 
 import numpy as np
@@ -66,27 +67,24 @@ class LightingRecord:
     shadows: int
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
 class DeviceMesh:
-    """A mesh's arrays on a device."""
+    """A mesh's arrays on a device; what only shading needs when it is asked for."""
 
-    mesh: Mesh
-    vertices: wp.array
-    normals: wp.array
-    uvs: wp.array
-    faces: wp.array
+    def __init__(self, mesh: Mesh, device: wp.Device) -> None:
+        self.mesh = mesh
+        self.vertices = wp.array(mesh.unit_vertices, dtype=wp.vec3, device=device)
+        self.faces = wp.array(mesh.faces, dtype=wp.vec3i, device=device)
 
-    @classmethod
-    def upload(cls, mesh: Mesh, device: wp.Device) -> DeviceMesh:
-        """Copy ``mesh`` to ``device``."""
-        uvs = np.zeros((0, 2), np.float32) if mesh.uvs is None else mesh.uvs
-        return cls(
-            mesh,
-            wp.array(mesh.unit_vertices, dtype=wp.vec3, device=device),
-            wp.array(mesh.normals, dtype=wp.vec3, device=device),
-            wp.array(uvs, dtype=wp.vec2, device=device),
-            wp.array(mesh.faces, dtype=wp.vec3i, device=device),
-        )
+    @functools.cached_property
+    def normals(self) -> wp.array:
+        """(n,) vec3 shading normals."""
+        return wp.array(self.mesh.normals, dtype=wp.vec3, device=self.vertices.device)
+
+    @functools.cached_property
+    def uvs(self) -> wp.array:
+        """(n,) vec2 texture coordinates, none if the mesh has none."""
+        uvs = np.zeros((0, 2), np.float32) if self.mesh.uvs is None else self.mesh.uvs
+        return wp.array(uvs, dtype=wp.vec2, device=self.vertices.device)
 
 
 @dataclasses.dataclass(eq=False)
@@ -120,7 +118,7 @@ class DeviceScene:
         for index, source in enumerate(scene.objects):
             mesh = source.geometry
             if id(mesh) not in meshes:
-                meshes[id(mesh)] = DeviceMesh.upload(mesh, device)
+                meshes[id(mesh)] = DeviceMesh(mesh, device)
             placed = self._placed(index, source, meshes[id(mesh)], first_triangle)
             self.objects.append(placed)
             first_triangle += len(mesh.faces)
@@ -139,6 +137,13 @@ class DeviceScene:
         """The objects that mirror."""
         return [entry for entry in self.objects if entry.source.is_reflector]
 
+    @functools.cached_property
+    def reflector_rows(self) -> tuple[wp.array, int]:
+        """(objects,) int32, first of a reflector's triangles among those of all reflectors; and how many there are."""
+        counts = [len(entry.geometry.faces) if entry.source.is_reflector else 0 for entry in self.objects]
+        firsts = np.cumsum([0, *counts])
+        return wp.array(firsts[:-1].astype(np.int32), dtype=wp.int32, device=self.device), int(firsts[-1])
+
     def look_from(self, camera: Camera) -> None:
         """Turn the environment to the camera's ``up``."""
         up = np.asarray(camera.up, float)
@@ -152,8 +157,7 @@ class DeviceScene:
         device_from_unit = self.device_from_world @ world_from_unit
         inverse = np.linalg.inv(device_from_unit)
         record = ObjectRecord()
-        record.vertices, record.normals = geometry.vertices, geometry.normals
-        record.uvs, record.faces = geometry.uvs, geometry.faces
+        record.vertices, record.faces = geometry.vertices, geometry.faces
         record.device_from_unit = wp.mat44(device_from_unit.astype(np.float32))
         record.unit_from_device = wp.mat44(inverse.astype(np.float32))
         normal_from_unit = inverse[:3, :3].T / np.abs(inverse[:3, :3]).max()
@@ -161,13 +165,17 @@ class DeviceScene:
         record.centre, record.radius = _bounding_sphere(geometry.mesh, device_from_unit)
         record.first_triangle, record.triangle_count = first_triangle, len(geometry.mesh.faces)
         material = source.material
-        record.smooth, record.fresnel = int(source.smooth), int(material.fresnel)
+        # An object that only glows needs no normals.
+        is_lit = max(*material.albedo, *material.mirror) > 0.0
+        record.smooth, record.fresnel = int(source.smooth and is_lit), int(material.fresnel)
+        record.normals = geometry.normals if record.smooth else wp.empty(0, dtype=wp.vec3, device=self.device)
         record.albedo, record.emission = wp.vec3(*material.albedo), wp.vec3(*material.emission)
         record.mirror = wp.vec3(*material.mirror)
-        self._look(record, source, geometry.mesh)
+        self._look(record, source, geometry)
         return DeviceObject(index, source, geometry, world_from_unit, record)
 
-    def _look(self, record: Any, source: Object, mesh: Mesh) -> None:
+    def _look(self, record: Any, source: Object, geometry: DeviceMesh) -> None:
+        mesh = geometry.mesh
         textures = [part.texture for part in mesh.parts]
         if source.texture is not None:
             textures = [source.texture] * len(mesh.parts)
@@ -179,6 +187,7 @@ class DeviceScene:
                 places[id(texture)] = (count, texture.shape[1], texture.shape[0])
                 texels.append(texture.reshape(-1, 3))
                 count += len(texels[-1])
+        record.uvs = geometry.uvs if texels else wp.empty(0, dtype=wp.vec2, device=self.device)
         table = [(0, 0, 0) if texture is None else places[id(texture)] for texture in textures]
         pool = np.concatenate(texels) if texels else np.zeros((0, 3), np.float32)
         record.part_first = wp.array([p.first_triangle for p in mesh.parts], dtype=wp.int32, device=self.device)
@@ -240,6 +249,6 @@ def _bounding_sphere(mesh: Mesh, device_from_unit: np.ndarray) -> tuple[wp.vec3,
     """About the box's centre, padded for the rounding of float32 positions."""
     centre = device_from_unit[:3, 3]
     points = mesh.unit_vertices.astype(float) @ device_from_unit[:3, :3].T
-    used = points[np.unique(mesh.faces)]
+    used = points[mesh.is_used]
     radius = float(np.sqrt((used**2).sum(axis=1).max()))
     return wp.vec3(*centre), radius * (1.0 + 1e-5) + 1e-6 * float(np.abs(centre).max())

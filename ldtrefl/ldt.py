@@ -257,7 +257,7 @@ class LayeredDepthTexture:
         except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
             raise InputError(f"{path}: not a layered depth texture that can be read ({error})") from error
         _check(frame, start, depth, reference, len(mesh.faces), path)
-        loaded = cls(DeviceMesh.upload(mesh, target), frame)
+        loaded = cls(DeviceMesh(mesh, target), frame)
         loaded._maps = sorted_maps(
             wp.array(start, dtype=wp.int32, device=target),
             wp.array(depth, dtype=wp.float32, device=target),
@@ -325,7 +325,7 @@ def peel(
     Raises:
         InputError: an empty mesh, an index out of range, a vertex that is not finite, a value not allowed.
     """
-    geometry = DeviceMesh.upload(Mesh(vertices, faces), launch.resolve_device(device))
+    geometry = DeviceMesh(Mesh(vertices, faces), launch.resolve_device(device))
     return peel_mesh(geometry, resolution, quality=quality, search=search)
 
 

@@ -69,10 +69,10 @@ class Crossing:
 
 
 @wp.func
-def box_span(size: wp.vec3i, origin: wp.vec3, direction: wp.vec3, t_max: float) -> wp.vec2:
-    """Slab test: where the ray enters and leaves the box, from 0 to ``t_max``; empty if the first is the larger."""
+def box_span(size: wp.vec3i, origin: wp.vec3, direction: wp.vec3) -> wp.vec2:
+    """Slab test: where the ray enters and leaves the box, from 0 on; empty if the first is the larger."""
     t_enter = float(0.0)
-    t_exit = t_max
+    t_exit = float(wp.inf)
     for axis in range(3):
         low, high = -BOX_MARGIN, float(size[axis]) + BOX_MARGIN
         if direction[axis] == 0.0:
@@ -171,11 +171,14 @@ def search_map(
 
 @wp.func
 def march_linear(view: LdtView, origin: wp.vec3, direction: wp.vec3, t_max: float) -> Crossing:
-    """The paper's search, in texel space: the nearest crossing that a map confirms, before ``t_max``."""
+    """The paper's search, in texel space: the nearest crossing that a map confirms, before ``t_max``.
+
+    Its steps share out the ray's way through the box whatever ``t_max``, so what is met does not depend on it.
+    """
     best = no_crossing(float(wp.inf))
     steps = int(0)
-    span = box_span(view.size, origin, direction, t_max)
-    if span[0] <= span[1]:
+    span = box_span(view.size, origin, direction)
+    if span[0] <= span[1] and span[0] < t_max:
         t_exit = span[1]
         for axis in range(3):
             if direction[axis] != 0.0:
@@ -184,6 +187,8 @@ def march_linear(view: LdtView, origin: wp.vec3, direction: wp.vec3, t_max: floa
                 if found.fragment >= 0:
                     best = found
                     t_exit = found.t  # the other maps need look no farther
+        if best.t >= t_max:
+            best = no_crossing(float(wp.inf))
     best.steps = steps
     return best
 

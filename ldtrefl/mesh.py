@@ -7,7 +7,7 @@ triangle's number means the same to the mesh, the ray caster and the layered dep
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -36,55 +36,65 @@ class Part:
     """``(h, w, 3)`` float32 linear, row 0 at v = 1; None without one."""
 
 
-@dataclass(frozen=True, eq=False)
 class Mesh:
-    """A checked triangle mesh.
+    """A checked triangle mesh; not to be changed once made.
 
     Raises:
         InputError: no triangles, an index out of range, a vertex that is not finite, or shapes that do not fit.
     """
 
-    vertices: np.ndarray
-    """(n, 3) float64."""
-    faces: np.ndarray
-    """(m, 3) int32."""
-    normals: np.ndarray | None = None
-    """(n, 3) float32 shading normals; made from the faces when not given."""
-    uvs: np.ndarray | None = None
-    """(n, 2) float32 texture coordinates, v = 0 at the bottom row."""
-    parts: tuple[Part, ...] = field(default=(Part(),))
-
-    def __post_init__(self) -> None:
-        vertices = _array(self.vertices, np.float64, 3, "vertices")
-        faces = _indices(self.faces)
-        if len(faces) == 0:
+    def __init__(
+        self,
+        vertices: Any,
+        faces: Any,
+        normals: Any = None,
+        uvs: Any = None,
+        parts: tuple[Part, ...] = (Part(),),
+    ) -> None:
+        self.vertices = _array(vertices, np.float64, 3, "vertices")
+        """(n, 3) float64."""
+        checked = _indices(faces)
+        if len(checked) == 0:
             raise InputError("the mesh has no triangles")
-        if len(faces) > MAX_TRIANGLES:
-            raise InputError(f"the mesh has {len(faces)} triangles, at most {MAX_TRIANGLES} allowed")
-        wrong = np.flatnonzero(((faces < 0) | (faces >= len(vertices))).any(axis=1))
+        if len(checked) > MAX_TRIANGLES:
+            raise InputError(f"the mesh has {len(checked)} triangles, at most {MAX_TRIANGLES} allowed")
+        wrong = np.flatnonzero(((checked < 0) | (checked >= len(self.vertices))).any(axis=1))
         if len(wrong):
             first = int(wrong[0])
             raise InputError(
-                f"triangle {first} has vertices {faces[first].tolist()}, allowed are 0 to {len(vertices) - 1}"
+                f"triangle {first} has vertices {checked[first].tolist()}, allowed are 0 to {len(self.vertices) - 1}"
             )
-        wrong = np.flatnonzero(~(np.abs(vertices) <= LARGEST_COORDINATE).all(axis=1))
+        wrong = np.flatnonzero(~(np.abs(self.vertices) <= LARGEST_COORDINATE).all(axis=1))
         if len(wrong):
             first = int(wrong[0])
-            raise InputError(f"vertex {first} is not finite or too large: {vertices[first].tolist()}")
-        faces = faces.astype(np.int32)
-        normals = self.normals
-        normals = smooth_normals(vertices, faces) if normals is None else _array(normals, np.float32, 3, "normals")
-        uvs = None if self.uvs is None else _array(self.uvs, np.float32, 2, "uvs")
-        for name, values in (("normals", normals), ("uvs", uvs)):
-            if values is not None and len(values) != len(vertices):
-                raise InputError(f"{len(values)} {name} for {len(vertices)} vertices")
-        for name, value in (("vertices", vertices), ("faces", faces), ("normals", normals), ("uvs", uvs)):
-            object.__setattr__(self, name, value)
+            raise InputError(f"vertex {first} is not finite or too large: {self.vertices[first].tolist()}")
+        self.faces = checked.astype(np.int32)
+        """(m, 3) int32."""
+        if normals is not None:
+            self.normals = _array(normals, np.float32, 3, "normals")
+        self.uvs = None if uvs is None else _array(uvs, np.float32, 2, "uvs")
+        """(n, 2) float32 texture coordinates, v = 0 at the bottom row."""
+        self.parts = parts
+        for name, values in (("normals", None if normals is None else self.normals), ("uvs", self.uvs)):
+            if values is not None and len(values) != len(self.vertices):
+                raise InputError(f"{len(values)} {name} for {len(self.vertices)} vertices")
+
+    @functools.cached_property
+    def normals(self) -> np.ndarray:
+        """(n, 3) float32 shading normals; made from the faces, when they are first asked for, if none were given."""
+        return smooth_normals(self.vertices, self.faces)
+
+    @functools.cached_property
+    def is_used(self) -> np.ndarray:
+        """(n,) bool: vertices that a triangle has."""
+        used = np.zeros(len(self.vertices), bool)
+        used[self.faces] = True
+        return used
 
     @functools.cached_property
     def bounds(self) -> np.ndarray:
         """(2, 3) float64: the lowest and highest corner of the triangles' box (unused vertices left out)."""
-        used = self.vertices[np.unique(self.faces)]
+        used = self.vertices[self.is_used]
         return np.stack([used.min(axis=0), used.max(axis=0)])
 
     @functools.cached_property
@@ -172,6 +182,11 @@ def _load_mesh(path: str, _modified: int, _size: int) -> Mesh:
 
 
 def _joined(pieces: list[trimesh.Trimesh]) -> Mesh:
+    if len(pieces) == 1:
+        uv = _uvs(pieces[0])
+        color, texture = _look(pieces[0])
+        part = Part(0, color, texture if uv is not None else None)
+        return Mesh(pieces[0].vertices, pieces[0].faces, _stored_normals(pieces[0]), uv, (part,))
     with_uvs = any(_uvs(piece) is not None for piece in pieces)
     vertices, faces, normals, uvs, parts = [], [], [], [], []
     vertex_count = triangle_count = 0
@@ -180,7 +195,7 @@ def _joined(pieces: list[trimesh.Trimesh]) -> Mesh:
         uv = _uvs(piece)
         vertices.append(checked.vertices)
         faces.append(checked.faces + vertex_count)
-        normals.append(np.asarray(checked.normals))
+        normals.append(checked.normals)
         uvs.append(np.zeros((len(checked.vertices), 2), np.float32) if uv is None else uv)
         color, texture = _look(piece)
         parts.append(Part(triangle_count, color, texture if uv is not None else None))

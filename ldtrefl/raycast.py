@@ -62,7 +62,7 @@ class Raycaster:
         Raises:
             InputError: an empty mesh, an index out of range, or a vertex that is not finite.
         """
-        self._build(DeviceMesh.upload(Mesh(vertices, faces), launch.resolve_device(device)))
+        self._build(DeviceMesh(Mesh(vertices, faces), launch.resolve_device(device)))
 
     @classmethod
     def of(cls, geometry: DeviceMesh) -> Raycaster:

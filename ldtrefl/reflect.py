@@ -19,9 +19,10 @@ import warp as wp
 
 from ldtrefl import launch
 from ldtrefl.camera import camera_ray
-from ldtrefl.cull import ReflectionRegions, can_show
+from ldtrefl.cull import Culled
 from ldtrefl.device_scene import DeviceScene, LightingRecord, ObjectRecord
 from ldtrefl.gbuffer import GBuffer, GBufferView, pixel_view
+from ldtrefl.rays import HitBuffer, RayBuffer, Regions, lowest_bit, meets_sphere, object_bits, sphere_entry
 from ldtrefl.shade import (
     Surface,
     environment_radiance,
@@ -30,30 +31,14 @@ from ldtrefl.shade import (
     mirror_direction,
     surface_at,
 )
+from ldtrefl.skips import Skips
 from ldtrefl.trace import Hit, Tracer, no_hit
 
+BLOCK = 8
+"""Pixels along a side of the blocks in which the first rays stand."""
 
-@wp.struct
-class RayBuffer:
-    """Rays on their way; a ray is dead where its source is -1."""
-
-    pixel: wp.array(dtype=wp.int32)
-    origin: wp.array(dtype=wp.vec3)
-    direction: wp.array(dtype=wp.vec3)
-    weight: wp.array(dtype=wp.vec3)  # what a unit of radiance met now adds to the pixel
-    source: wp.array(dtype=wp.int32)  # the object that it left
-    row: wp.array(dtype=wp.int32)  # its triangle's row in the reflection regions, -1 for none
-
-
-@wp.struct
-class HitBuffer:
-    """Where the rays of a ``RayBuffer`` end."""
-
-    t: wp.array(dtype=float)  # device units, +inf on a miss
-    object: wp.array(dtype=wp.int32)
-    triangle: wp.array(dtype=wp.int32)
-    barycentrics: wp.array(dtype=wp.vec2)
-    steps: wp.array(dtype=wp.int32)
+BEYOND = wp.constant(1.000001)
+"""Of the distance that was met, how far another object is searched: what lies in the same place must be found too."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,23 +82,12 @@ def no_shadows(device: wp.Device) -> BoundTracer:
 # Kernels built from a tracer.
 
 
-@wp.func
-def may_meet_sphere(origin: wp.vec3, direction: wp.vec3, t_max: float, centre: wp.vec3, radius: float) -> bool:
-    """Whether a ray passes through a sphere before ``t_max``."""
-    offset = centre - origin
-    along = wp.dot(offset, direction)
-    aside = offset - along * direction
-    half_chord_squared = radius * radius - wp.dot(aside, aside)
-    if half_chord_squared < 0.0:
-        return False
-    half_chord = wp.sqrt(half_chord_squared)
-    return along + half_chord >= 0.0 and along - half_chord < t_max
-
-
 @functools.cache
-def closest_hits_kernel(tracer: Tracer) -> wp.Kernel:
-    """The kernel that finds where rays end."""
+def closest_hits_kernel(tracer: Tracer, bounds: bool = True) -> wp.Kernel:
+    """The kernel that finds where rays end. With ``bounds`` an object is searched for only if the ray enters its
+    bounding sphere before it has met another; of 32 the first to be entered comes first."""
     closest_hit = tracer.closest_hit
+    in_bounds_only = wp.constant(1 if bounds else 0)
 
     @launch.kernel
     def closest_hits(
@@ -122,41 +96,85 @@ def closest_hits_kernel(tracer: Tracer) -> wp.Kernel:
         rays: RayBuffer,
         objects: wp.array(dtype=ObjectRecord),
         views: wp.array(dtype=tracer.view),
-        region_bits: wp.array2d(dtype=wp.uint32),
+        regions: Regions,
         # Out:
         hits: HitBuffer,
     ):
         i = first + wp.tid()
+        source = rays.source[i]
         best = float(wp.inf)
         best_object = int(-1)
         best_triangle = int(-1)
         best_barycentrics = wp.vec2(0.0, 0.0)
         steps = int(0)
-        if rays.source[i] >= 0:
-            origin = rays.origin[i]
-            direction = rays.direction[i]
-            for k in range(objects.shape[0]):
-                if (
-                    k != rays.source[i]
-                    and can_show(region_bits, rays.row[i], k)
-                    and may_meet_sphere(origin, direction, best, objects[k].centre, objects[k].radius)
-                ):
-                    # t stays in device units: divide by the direction's length in unit space.
-                    way = wp.transform_vector(objects[k].unit_from_device, direction)
-                    stretch = wp.length(way)
-                    start = wp.transform_point(objects[k].unit_from_device, origin)
-                    hit = closest_hit(views, k, start, way / stretch, best * stretch)
-                    steps += hit.steps
-                    if hit.triangle >= 0 and hit.t / stretch < best:
-                        best = hit.t / stretch
+        searches = int(0)
+        words = int(0)
+        if source >= 0:
+            words = (objects.shape[0] + 31) / 32
+        origin = rays.origin[i]
+        direction = rays.direction[i]
+        for word in range(words):
+            left = object_bits(regions, objects, i, word)
+            if source / 32 == word:
+                left = left & ~(wp.uint32(1) << wp.uint32(source % 32))
+
+            # Drop the spheres that the ray misses; begin with the one that it enters first.
+            k = int(-1)
+            if in_bounds_only == 0 or (left & (left - wp.uint32(1))) == wp.uint32(0):
+                if left != wp.uint32(0):
+                    k = 32 * word + lowest_bit(left)
+                    if in_bounds_only != 0:
+                        if not meets_sphere(origin, direction, objects[k].centre, objects[k].radius):
+                            k = int(-1)
+            else:
+                nearest = float(wp.inf)
+                rest = wp.uint32(left)
+                while rest != wp.uint32(0):
+                    j = 32 * word + lowest_bit(rest)
+                    entry = sphere_entry(origin, direction, objects[j].centre, objects[j].radius)
+                    if entry < 0.0 or entry > best:
+                        left = left & ~(wp.uint32(1) << wp.uint32(j % 32))
+                    elif entry < nearest:
+                        nearest = entry
+                        k = j
+                    rest = rest & (rest - wp.uint32(1))
+
+            while k >= 0:
+                left = left & ~(wp.uint32(1) << wp.uint32(k % 32))
+                # t stays in device units: divide by the direction's length in unit space.
+                way = wp.transform_vector(objects[k].unit_from_device, direction)
+                stretch = wp.length(way)
+                start = wp.transform_point(objects[k].unit_from_device, origin)
+                t_max = float(wp.inf)
+                if in_bounds_only != 0:
+                    t_max = BEYOND * best * stretch
+                hit = closest_hit(views, k, start, way / stretch, t_max)
+                steps += hit.steps
+                searches += 1
+                if hit.triangle >= 0:
+                    t = hit.t / stretch
+                    # Of two in one place the first counts, in whatever order they are met.
+                    if t < best or (t == best and k < best_object):
+                        best = t
                         best_object = k
                         best_triangle = hit.triangle
                         best_barycentrics = wp.vec2(hit.u, hit.v)
+
+                # The next that begins before what is met.
+                k = int(-1)
+                while k < 0 and left != wp.uint32(0):
+                    j = 32 * word + lowest_bit(left)
+                    k = j
+                    if in_bounds_only != 0:
+                        if sphere_entry(origin, direction, objects[j].centre, objects[j].radius) > best:
+                            k = int(-1)
+                            left = left & (left - wp.uint32(1))
         hits.t[i] = best
         hits.object[i] = best_object
         hits.triangle[i] = best_triangle
         hits.barycentrics[i] = best_barycentrics
         hits.steps[i] = steps
+        hits.searches[i] = searches
 
     return closest_hits
 
@@ -178,7 +196,8 @@ def direct_radiance_of(tracer: Tracer) -> Any:
     ) -> bool:
         origin = surface.position + clearance * surface.facet
         for k in range(objects.shape[0]):
-            if may_meet_sphere(origin, towards, distance, objects[k].centre, objects[k].radius):
+            entry = sphere_entry(origin, towards, objects[k].centre, objects[k].radius)
+            if entry >= 0.0 and entry < distance:
                 way = wp.transform_vector(objects[k].unit_from_device, towards)
                 stretch = wp.length(way)
                 start = wp.transform_point(objects[k].unit_from_device, origin)
@@ -277,7 +296,6 @@ def shade_hits_kernel(tracer: Tracer) -> wp.Kernel:
                     rays.origin[i] = surface.position
                     rays.direction[i] = onwards
                     rays.weight[i] = wp.cw_mul(weight, surface.mirror)
-                    rays.row[i] = -1
                     source = index
             radiance[pixel] = radiance[pixel] + wp.cw_mul(weight, light)
         rays.source[i] = source
@@ -291,7 +309,6 @@ def start_rays(
     # In:
     gbuffer: GBufferView,
     objects: wp.array(dtype=ObjectRecord),
-    first_rows: wp.array(dtype=wp.int32),
     # In and out:
     rays: RayBuffer,
 ):
@@ -305,9 +322,6 @@ def start_rays(
     rays.direction[i] = mirror_direction(view, surface.normal)
     rays.weight[i] = wp.vec3(1.0)
     rays.source[i] = index
-    rays.row[i] = -1
-    if first_rows[index] >= 0:
-        rays.row[i] = first_rows[index] + gbuffer.triangle[pixel]
 
 
 @dataclass(frozen=True, eq=False)
@@ -343,64 +357,81 @@ class FirstHits:
         return picture.reshape(self.shape)
 
 
-def mirror_rays(gbuffer: GBuffer, regions: ReflectionRegions | None) -> Any:
-    """The ``RayBuffer`` of the first reflection: one ray per pixel that sees a reflector."""
+def mirror_rays(gbuffer: GBuffer) -> Any:
+    """The ``RayBuffer`` of the first reflection: one ray per pixel that sees a reflector, in blocks of pixels."""
     scene, device = gbuffer.scene, gbuffer.scene.device
-    pixels = np.flatnonzero(gbuffer.reflector_mask).astype(np.int32)
+    pixels = pixels_in_blocks(gbuffer.reflector_mask)
     n = len(pixels)
     rays = RayBuffer()
     rays.pixel = wp.array(pixels, dtype=wp.int32, device=device)
     rays.origin, rays.direction, rays.weight = (wp.empty(n, dtype=wp.vec3, device=device) for _ in range(3))
-    rays.source, rays.row = (wp.empty(n, dtype=wp.int32, device=device) for _ in range(2))
-    if regions is None:
-        rows = wp.full(len(scene.objects), -1, dtype=wp.int32, device=device)
-    else:
-        rows = regions.first_rows
-    launch.launch(start_rays, n, [gbuffer.view, scene.records, rows, rays], device)
+    rays.source = wp.empty(n, dtype=wp.int32, device=device)
+    launch.launch(start_rays, n, [gbuffer.view, scene.records, rays], device)
     return rays
+
+
+def pixels_in_blocks(mask: np.ndarray) -> np.ndarray:
+    """(n,) int32 numbers of the pixels set in an (h, w) bool mask, block by block of ``BLOCK`` x ``BLOCK``."""
+    height, width = mask.shape
+    padded = np.pad(mask, ((0, -height % BLOCK), (0, -width % BLOCK)))
+    blocks = padded.reshape(padded.shape[0] // BLOCK, BLOCK, padded.shape[1] // BLOCK, BLOCK).transpose(0, 2, 1, 3)
+    return _pixels_by_place(height, width)[np.flatnonzero(blocks)]
+
+
+@functools.lru_cache(maxsize=4)
+def _pixels_by_place(height: int, width: int) -> np.ndarray:
+    """The number of the pixel at each place of the blocks; places beyond the image hold any."""
+    rows, columns = -(-height // BLOCK), -(-width // BLOCK)
+    y, x = np.mgrid[: rows * BLOCK, : columns * BLOCK].astype(np.int32)
+    pixels = (y * width + x).reshape(rows, BLOCK, columns, BLOCK)
+    return np.ascontiguousarray(pixels.transpose(0, 2, 1, 3)).ravel()
 
 
 def follow_rays(
     gbuffer: GBuffer,
-    regions: ReflectionRegions | None,
+    cull: Callable[[Any, int], Culled],
     bind: Callable[[set[int]], BoundTracer],
     max_bounces: int,
+    skips: Skips,
     stats: launch.Stats,
 ) -> tuple[wp.array, FirstHits]:
     """Reflected radiance of every pixel, (h * w,) vec3, and where the first rays end.
 
-    ``bind(objects)`` makes the tracer ready for the numbers of the objects that rays may meet.
+    ``cull(rays, bounce)`` says which objects rays may meet; ``bind(objects)`` makes the tracer ready for those.
     """
     scene, device = gbuffer.scene, gbuffer.scene.device
     everything = {entry.index for entry in scene.objects}
     shadows = bool(scene.lighting.shadows)
-    bound = bind(everything if shadows or max_bounces > 1 or regions is None else regions.shown)
-    bits = wp.zeros((1, 1), dtype=wp.uint32, device=device) if regions is None else regions.bits
     with stats.stage("march", device):
-        rays = mirror_rays(gbuffer, regions)
-    n = rays.pixel.shape[0]
-    stats.count("rays", n)
+        rays = mirror_rays(gbuffer)
+    n = alive = rays.pixel.shape[0]
     radiance = wp.zeros(gbuffer.pixel_count, dtype=wp.vec3, device=device)
-    shadow = bound if shadows else no_shadows(device)
     first_hits = None
     for bounce in range(max_bounces):
+        stats.count("rays", alive)
+        with stats.stage("cull", device):
+            culled = cull(rays, bounce)
+        bound = bind(everything if shadows or not skips.maps else culled.shown)
         with stats.stage("march", device):
             if bounce < 2:  # the first bounce's are kept
                 hits = _hit_buffer(n, device)
-            inputs = [rays, scene.records, bound.views, bits, hits]
-            launch.launch(closest_hits_kernel(bound.tracer), n, inputs, device)
+            inputs = [rays, scene.records, bound.views, culled.regions, hits]
+            launch.launch(closest_hits_kernel(bound.tracer, skips.bounds), n, inputs, device)
             stats.count("steps", int(hits.steps.numpy().sum(dtype=np.int64)))
+            searches = int(hits.searches.numpy().sum(dtype=np.int64))
+            stats.count("searches", searches)
+            stats.count("searches_saved", alive * (len(scene.objects) - 1) - searches)
         if first_hits is None:
             shape = (gbuffer.camera.height, gbuffer.camera.width)
             first_hits = FirstHits(shape, rays, hits, scene.device_units_per_world_unit)
         with stats.stage("shade", device):
+            shadow = bound if shadows else no_shadows(device)
             is_last = int(bounce + 1 == max_bounces)
             inputs = [hits, scene.records, scene.lighting, shadow.views, is_last, rays, radiance]
             launch.launch(shade_hits_kernel(shadow.tracer), n, inputs, device)
             alive = 0 if is_last else int((rays.source.numpy() >= 0).sum())
         if alive == 0:
             break
-        stats.count("rays", alive)
     assert first_hits is not None
     return radiance, first_hits
 
@@ -408,7 +439,8 @@ def follow_rays(
 def _hit_buffer(n: int, device: wp.Device) -> Any:
     hits = HitBuffer()
     hits.t = wp.empty(n, dtype=float, device=device)
-    hits.object, hits.triangle, hits.steps = (wp.empty(n, dtype=wp.int32, device=device) for _ in range(3))
+    hits.object, hits.triangle = (wp.empty(n, dtype=wp.int32, device=device) for _ in range(2))
+    hits.steps, hits.searches = (wp.empty(n, dtype=wp.int32, device=device) for _ in range(2))
     hits.barycentrics = wp.empty(n, dtype=wp.vec2, device=device)
     return hits
 

@@ -76,7 +76,7 @@ class Renderer:
         scene, device, stats = self._device_scene, self._device_scene.device, Stats()
         scene.look_from(camera)
         with stats.stage("gbuffer", device):
-            if self._gbuffer is None or self._gbuffer.camera != camera:
+            if self._gbuffer is None or self._gbuffer.camera != camera or not self._method.skips.frames:
                 self._gbuffer = draw_gbuffer(scene, camera)
             gbuffer = self._gbuffer
             mask = gbuffer.reflector_mask
@@ -86,7 +86,7 @@ class Renderer:
         shadow = self._method.shadow_tracer(stats) if self.scene.lighting.shadows else no_shadows(device)
         with stats.stage("shade", device):
             direct, mirror = shade_gbuffer(gbuffer, shadow)
-        if mask.any():
+        if mask.any() or not self._method.skips.reflection:
             reflection = self._method.reflect(gbuffer, stats)
         else:
             reflection = Reflection(wp.zeros(gbuffer.pixel_count, dtype=wp.vec3, device=device))

@@ -104,7 +104,7 @@ def _join(*meshes: Mesh) -> Mesh:
     return Mesh(
         np.concatenate([mesh.vertices for mesh in meshes]),
         np.concatenate([mesh.faces + offset for mesh, offset in zip(meshes, offsets, strict=True)]),
-        np.concatenate([mesh.normals for mesh in meshes if mesh.normals is not None]),
+        np.concatenate([mesh.normals for mesh in meshes]),
         np.concatenate([mesh.uvs for mesh in meshes if mesh.uvs is not None]) if with_uvs else None,
     )
 

@@ -224,7 +224,7 @@ def rays_on_mesh(name: str, mesh: ldtrefl.Mesh, o: np.ndarray, d: np.ndarray, ro
     """One row of :func:`rays_on_meshes`."""
     device = launch.resolve_device(None)
     origins, directions = (wp.array(x, dtype=wp.vec3, device=device) for x in (o, d))
-    geometry = DeviceMesh.upload(mesh, device)
+    geometry = DeviceMesh(mesh, device)
     embree, caster = embree_scene(mesh), Raycaster.of(geometry)
     qualities: tuple[Quality, ...] = ("exact", "balanced", "fast")
     maps = {quality: peel_mesh(geometry, quality=quality) for quality in qualities}
@@ -381,7 +381,7 @@ def thread_scaling(quick: bool, rounds: int) -> dict[str, Any]:
     device = launch.resolve_device(None)
     segments = (600, 80) if quick else (2000, 125)
     mesh = shapes.make("torus_knot", {"segments": list(segments)})
-    geometry = DeviceMesh.upload(ldtrefl.Mesh(mesh.unit_vertices, mesh.faces), device)
+    geometry = DeviceMesh(ldtrefl.Mesh(mesh.unit_vertices, mesh.faces), device)
     o, d = mirror_rays(768, 512)
     origins, directions = (wp.array(x, dtype=wp.vec3, device=device) for x in (o, d))
     batch = Batch(TRACERS["exact"], peel_mesh(geometry).view(), origins, directions)
@@ -415,7 +415,7 @@ def paper_tables(quick: bool, rounds: int) -> dict[str, Any]:
         mesh = load(name) if not quick or name in shapes.names() else None
         if mesh is None:
             continue
-        geometry = DeviceMesh.upload(mesh, device)
+        geometry = DeviceMesh(mesh, device)
         maps = peel_mesh(geometry, search="linear")
         times = timed_in_turn({"peel": functools.partial(peel_mesh, geometry, search="linear")}, rounds)
         table_1[model] = {

@@ -13,12 +13,14 @@ from typing import Any, ClassVar
 
 import warp as wp
 from pydantic import ConfigDict, TypeAdapter, ValidationError
+from pydantic.dataclasses import dataclass as pydantic_dataclass
 
 from ldtrefl.device_scene import DeviceScene
 from ldtrefl.errors import InputError, first_fault, unknown_name
 from ldtrefl.gbuffer import GBuffer
 from ldtrefl.launch import Stats
 from ldtrefl.reflect import BoundTracer, FirstHits
+from ldtrefl.skips import Choice, chosen
 
 CONFIG = ConfigDict(extra="forbid", use_attribute_docstrings=True)
 """How every method's ``Config`` is checked."""
@@ -34,6 +36,14 @@ class Reflection:
     """Where the first rays ended, for methods that have rays."""
 
 
+@pydantic_dataclass(frozen=True, kw_only=True, config=CONFIG)
+class CommonConfig:
+    """What every method's ``Config`` begins with."""
+
+    skip: Choice = "all"
+    """What the scene does not need is left out: all of it, none, or a list of names, for measurement."""
+
+
 class Method(abc.ABC):
     """A way to compute reflections."""
 
@@ -44,6 +54,7 @@ class Method(abc.ABC):
     def __init__(self, scene: DeviceScene, config: Any) -> None:
         self.scene = scene
         self.config = config
+        self.skips = chosen(config.skip)
 
     @abc.abstractmethod
     def reflect(self, gbuffer: GBuffer, stats: Stats) -> Reflection:

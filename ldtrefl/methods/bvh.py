@@ -16,9 +16,10 @@ import warp as wp
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
+from ldtrefl.cull import not_culled
 from ldtrefl.gbuffer import GBuffer
 from ldtrefl.launch import Stats
-from ldtrefl.methods.base import CONFIG, Method, Reflection
+from ldtrefl.methods.base import CONFIG, CommonConfig, Method, Reflection
 from ldtrefl.raycast import BVH, BvhView, Raycaster
 from ldtrefl.reflect import BoundTracer, follow_rays
 
@@ -29,7 +30,7 @@ class Bvh(Method):
     name = "bvh"
 
     @dataclass(frozen=True, kw_only=True, config=CONFIG)
-    class Config:
+    class Config(CommonConfig):
         """Options of ``bvh``."""
 
         max_bounces: Annotated[int, Field(strict=True, ge=1, le=64)] | None = None
@@ -53,4 +54,6 @@ class Bvh(Method):
     def reflect(self, gbuffer: GBuffer, stats: Stats) -> Reflection:
         """Trace every reflected ray."""
         bounces = self.config.max_bounces or self.scene.scene.reflection.max_bounces
-        return Reflection(*follow_rays(gbuffer, None, lambda _objects: self._bind(stats), bounces, stats))
+        everything = not_culled(self.scene)
+        cull, bind = (lambda _rays, _bounce: everything), (lambda _objects: self._bind(stats))
+        return Reflection(*follow_rays(gbuffer, cull, bind, bounces, self.skips, stats))

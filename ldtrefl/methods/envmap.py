@@ -22,7 +22,7 @@ from ldtrefl import launch
 from ldtrefl.device_scene import DeviceObject, ObjectRecord
 from ldtrefl.gbuffer import GBuffer, GBufferView, draw_gbuffer, pixel_view
 from ldtrefl.launch import Stats
-from ldtrefl.methods.base import CONFIG, Method, Reflection
+from ldtrefl.methods.base import CONFIG, CommonConfig, Method, Reflection
 from ldtrefl.raycast import BVH, BvhView, Raycaster
 from ldtrefl.reflect import BoundTracer, no_shadows, shade_gbuffer
 from ldtrefl.scene import Camera
@@ -90,7 +90,7 @@ class EnvironmentMap(Method):
     name = "envmap"
 
     @dataclass(frozen=True, kw_only=True, config=CONFIG)
-    class Config:
+    class Config(CommonConfig):
         """Options of ``envmap``."""
 
         resolution: Annotated[int, Field(strict=True, ge=1, le=4096)] = 512

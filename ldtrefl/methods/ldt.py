@@ -15,13 +15,13 @@ Fails: ``search=linear`` misses what is thinner than a step or a texel, and its 
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import warp as wp
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from ldtrefl.cull import CullTest, find_regions
+from ldtrefl.cull import Culled, CullTest, cull_rays, not_culled
 from ldtrefl.gbuffer import GBuffer
 from ldtrefl.grid_build import Quality
 from ldtrefl.launch import Stats
@@ -34,7 +34,7 @@ from ldtrefl.ldt import (
     peel_mesh,
 )
 from ldtrefl.march import TRACERS
-from ldtrefl.methods.base import CONFIG, Method, Reflection
+from ldtrefl.methods.base import CONFIG, CommonConfig, Method, Reflection
 from ldtrefl.reflect import BoundTracer, follow_rays
 
 
@@ -44,7 +44,7 @@ class Ldt(Method):
     name = "ldt"
 
     @dataclass(frozen=True, kw_only=True, config=CONFIG)
-    class Config:
+    class Config(CommonConfig):
         """Options of ``ldt``."""
 
         resolution: Annotated[int, Field(strict=True, ge=16, le=4096)] = DEFAULT_RESOLUTION
@@ -58,7 +58,7 @@ class Ldt(Method):
         binary_steps: Annotated[int, Field(strict=True, ge=0, le=64)] = BINARY_STEPS
         """Bisections of the step that crosses a surface."""
         cull: CullTest = "safe"
-        """Reflection regions: safe (loses nothing), flat (the paper's, for flat mirror triangles), none."""
+        """Reflection regions: safe (loses nothing), flat (the paper's, for flat mirror triangles)."""
         max_bounces: Annotated[int, Field(strict=True, ge=1, le=64)] | None = None
         """Reflections in reflections; the scene's number if not given."""
 
@@ -76,10 +76,15 @@ class Ldt(Method):
                     stats.count("map_bytes", maps[id(geometry)].nbytes)
         tracer = TRACERS[search]
         steps = {"linear_steps": self.config.linear_steps, "binary_steps": self.config.binary_steps}
-        views = [
-            maps[id(entry.geometry)].view(search, **steps) if id(entry.geometry) in maps else tracer.view()
-            for entry in self.scene.objects
-        ]
+        views = []
+        for entry in self.scene.objects:
+            peeled = maps.get(id(entry.geometry))
+            if peeled is None:
+                views.append(tracer.view())
+            elif search == "exact" and not self.skips.leaps:
+                views.append(peeled.grid.view_without_leaps)
+            else:
+                views.append(peeled.view(search, **steps))
         return BoundTracer(tracer, wp.array(views, dtype=tracer.view, device=self.scene.device))
 
     def shadow_tracer(self, stats: Stats) -> BoundTracer:
@@ -88,10 +93,14 @@ class Ldt(Method):
 
     def reflect(self, gbuffer: GBuffer, stats: Stats) -> Reflection:
         """Cull, peel what is left on first need, march."""
-        with stats.stage("cull", self.scene.device):
-            regions = find_regions(gbuffer, self.config.cull, stats)
         bounces = self.config.max_bounces or self.scene.scene.reflection.max_bounces
-        followed = follow_rays(gbuffer, regions, lambda needed: self._bind(needed, stats), bounces, stats)
+
+        def cull(rays: Any, bounce: int) -> Culled:
+            if not self.skips.regions:
+                return not_culled(self.scene)
+            return cull_rays(gbuffer, rays, bounce, self.config.cull, stats)
+
+        followed = follow_rays(gbuffer, cull, lambda needed: self._bind(needed, stats), bounces, self.skips, stats)
         meshes = {id(entry.geometry) for entry in self.scene.objects}
         stats.count("objects_skipped", len(meshes) - len(self.__dict__["_maps"]))
         return Reflection(*followed)

@@ -100,7 +100,6 @@ class Reference:
                 np.abs((np.cross(q - points, r - points) * facet).sum(axis=1)) / area
                 for q, r in ((b, c), (c, a), (a, b))
             ]
-            assert entry.geometry.normals is not None
             corners = entry.geometry.normals[entry.geometry.faces[triangles]]
             mixed = sum(w[:, None] * corners[:, i] for i, w in enumerate(weights))
             normal = mixed @ np.linalg.inv(entry.world_from_object()[:3, :3])

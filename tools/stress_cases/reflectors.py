@@ -17,7 +17,6 @@ MIRROR = ldtrefl.Material(albedo=(0.05,) * 3, mirror=(0.9,) * 3)
 def run(rays: int, pictures: int) -> list[Outcome]:
     """Pictures of ``pictures`` pixels a side."""
     ball = shapes.make("sphere", {"segments": [48, 24]})
-    assert ball.normals is not None
     spoilt = ball.normals.copy()
     spoilt[::3], spoilt[1::7], spoilt[2::11] = 0.0, -spoilt[1::7], 1e-30
     away = -ball.normals

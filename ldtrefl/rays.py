@@ -1,0 +1,96 @@
+"""Rays on their way and where they end, as arrays; bounding spheres along a ray.
+
+Device space; directions have unit length.
+"""
+
+from __future__ import annotations
+
+import warp as wp
+
+from ldtrefl.device_scene import ObjectRecord
+
+RUN = wp.constant(64)
+"""Rays in a row that are culled together. The rays of the first bounce stand in blocks of 8 x 8 pixels."""
+
+
+@wp.struct
+class RayBuffer:
+    """Rays on their way; a ray is dead where its source is -1."""
+
+    pixel: wp.array(dtype=wp.int32)
+    origin: wp.array(dtype=wp.vec3)
+    direction: wp.array(dtype=wp.vec3)
+    weight: wp.array(dtype=wp.vec3)  # what a unit of radiance met now adds to the pixel
+    source: wp.array(dtype=wp.int32)  # the object that it left
+
+
+@wp.struct
+class HitBuffer:
+    """Where the rays of a ``RayBuffer`` end."""
+
+    t: wp.array(dtype=float)  # device units, +inf on a miss
+    object: wp.array(dtype=wp.int32)
+    triangle: wp.array(dtype=wp.int32)
+    barycentrics: wp.array(dtype=wp.vec2)
+    steps: wp.array(dtype=wp.int32)
+    searches: wp.array(dtype=wp.int32)  # objects that the ray was searched for in
+
+
+@wp.func
+def meets_sphere(origin: wp.vec3, direction: wp.vec3, centre: wp.vec3, radius: float) -> bool:
+    """Whether a ray meets a sphere, or begins inside it: the same answer as ``sphere_entry``'s without its root."""
+    offset = centre - origin
+    along = wp.dot(offset, direction)
+    aside = offset - along * direction
+    return wp.dot(aside, aside) <= radius * radius and (along >= 0.0 or wp.dot(offset, offset) <= radius * radius)
+
+
+@wp.func
+def sphere_entry(origin: wp.vec3, direction: wp.vec3, centre: wp.vec3, radius: float) -> float:
+    """Where a ray enters a sphere: t, 0 from inside, -1 if it misses it."""
+    offset = centre - origin
+    along = wp.dot(offset, direction)
+    aside = offset - along * direction
+    half_chord_squared = radius * radius - wp.dot(aside, aside)
+    if half_chord_squared < 0.0:
+        return -1.0
+    half_chord = wp.sqrt(half_chord_squared)
+    if along + half_chord < 0.0:
+        return -1.0
+    return wp.max(along - half_chord, 0.0)
+
+
+LOWEST_BIT = """
+#if defined(__CUDA_ARCH__)
+    return __ffs((int)word) - 1;
+#else
+    return __builtin_ctz(word);
+#endif
+"""
+
+
+@wp.func_native(LOWEST_BIT)
+def lowest_bit(word: wp.uint32) -> wp.int32:
+    """The number of the lowest bit that is set; of none, undefined."""
+    ...
+
+
+@wp.struct
+class Regions:
+    """Which objects each ray can meet: a row of bits, one per object."""
+
+    bits: wp.array2d(dtype=wp.uint32)  # empty: every ray all objects
+    rows: wp.array(dtype=wp.int32)  # of each ray; empty: its run's
+
+
+@wp.func
+def object_bits(regions: Regions, objects: wp.array(dtype=ObjectRecord), i: int, word: int) -> wp.uint32:
+    """The objects ``32 * word`` to ``32 * word + 31`` that ray ``i`` can meet, a bit each."""
+    if regions.bits.shape[0] > 0:
+        if regions.rows.shape[0] > 0:
+            return regions.bits[regions.rows[i], word]
+        return regions.bits[i / RUN, word]
+    rest = objects.shape[0] - 32 * word
+    if rest >= 32:
+        return ~wp.uint32(0)
+    return (wp.uint32(1) << wp.uint32(rest)) - wp.uint32(1)
