@@ -120,7 +120,7 @@ class Grid:
     def view_without_leaps(self) -> Any:
         """The ``GridView`` in which empty bricks are crossed one by one, to measure what the leaps save."""
         view = GridView()
-        for name in GridView.vars:
+        for name in vars(GridView)["vars"]:
             setattr(view, name, getattr(self.view, name))
         single = np.minimum(self.view.leaps.numpy(), 1)
         view.leaps = wp.array(single, dtype=wp.uint8, device=self.view.leaps.device)

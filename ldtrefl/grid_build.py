@@ -14,6 +14,7 @@ from ldtrefl import launch
 from ldtrefl.binning import bin_items, exclusive_scan
 from ldtrefl.cubemap import TexelFrame, texel_frame
 from ldtrefl.device_scene import DeviceMesh
+from ldtrefl.doubts import Doubts, doubts_of
 from ldtrefl.grid import BRICK, CELLS, LANES, ROWS, TRIANGLE, Grid, GridView, cell_number, number_of_cell
 from ldtrefl.patches import Piece, Survey
 
@@ -30,6 +31,12 @@ DENSE_GRID_CELLS = 128
 PATCH_TEXELS: dict[Quality, float] = {"fast": 4.0, "balanced": 1.6}
 """Texels along a side of a patch. The plane of one is off by the square of its side: on a torus knot at 256, 1.6 texels
 give 0.1% wrong hits and a tenth of a texel at the 99th percentile; 1 texel a third of that at 15% more time."""
+
+LARGEST_TURN: dict[Quality, float] = {"fast": 0.5, "balanced": 0.2}
+"""Radians between neighbouring patches from which they are in doubt, see ``doubts.py``."""
+DOUBTFUL = 0.05
+"""Share of patches in doubt up to which the others are worth having; a detailed scan is better kept as triangles, in a
+grid as fine as they are."""
 
 DENSE = 2.2
 """Small triangles per texel of surface from which patches stand for them: the maps are then the coarser picture."""
@@ -68,6 +75,7 @@ class GridTarget:
     vertices: wp.array(dtype=wp.vec3)  # unit space
     faces: wp.array(dtype=wp.vec3i)
     patches: wp.array(dtype=Piece)
+    doubtful: wp.array(dtype=wp.uint8)  # 1 for cells that no patch goes into; empty: none
     cells_per_unit: float
     cell_offset: wp.vec3
     bricks: wp.vec3i
@@ -170,6 +178,14 @@ def fits_mask(box: CellBox) -> bool:
     return wp.int64(n[0]) * wp.int64(n[1]) * wp.int64(n[2]) <= wp.int64(MASK_BITS)
 
 
+@wp.func
+def belongs(target: GridTarget, piece: Piece, x: int, y: int, z: int) -> bool:
+    """Whether a piece may go into a cell."""
+    if piece.kind == TRIANGLE or target.doubtful.shape[0] == 0:
+        return True
+    return target.doubtful[number_of_cell(target.bricks, x, y, z)] == wp.uint8(0)
+
+
 @launch.kernel
 def find_cells(
     first: int,
@@ -191,7 +207,7 @@ def find_cells(
     for z in range(box.first[2], box.last[2] + 1):
         for y in range(box.first[1], box.last[1] + 1):
             for x in range(box.first[0], box.last[0] + 1):
-                if is_one_cell or touches_cell(piece, x, y, z):
+                if belongs(target, piece, x, y, z) and (is_one_cell or touches_cell(piece, x, y, z)):
                     count += 1
                     if is_masked:
                         mask = mask | bit
@@ -227,7 +243,7 @@ def list_cells(
             for x in range(box.first[0], box.last[0] + 1):
                 is_touched = (mask & wp.uint64(1)) != wp.uint64(0)
                 if not is_masked:
-                    is_touched = touches_cell(piece, x, y, z)
+                    is_touched = belongs(target, piece, x, y, z) and touches_cell(piece, x, y, z)
                 if is_touched:
                     cell = number_of_cell(target.bricks, x, y, z)
                     cell_out[place] = cell
@@ -407,7 +423,7 @@ def build_grid(geometry: DeviceMesh, resolution: int, quality: Quality) -> Grid:
     """The occupancy grid of a mesh; ``quality`` chooses between triangles and patches.
 
     ``exact`` keeps every triangle; the others keep them unless they are much finer than patches of ``PATCH_TEXELS`` of
-    the maps' texels, which then stand for them.
+    the maps' texels, and smooth on that scale: patches then stand for them.
     """
     triangles = len(geometry.faces)
     if quality != "exact" and triangles > FEW_TRIANGLES:
@@ -415,16 +431,23 @@ def build_grid(geometry: DeviceMesh, resolution: int, quality: Quality) -> Grid:
         target, ratio = _target(geometry, frame, FAST_GRID_CELLS if quality == "fast" else GRID_CELLS)
         survey = Survey(geometry, frame, ratio, target.bricks)
         if survey.small > DENSE * survey.count * PATCH_TEXELS[quality] ** 2:
-            target.patches = survey.patches()
-            cell, item = _patches_and_the_rest(target, survey)
-            view = _built(target, geometry, cell, item)
-            view.front = float(survey.front)
-            view.low, view.high = view.low - PATCH_RISE, view.high + PATCH_RISE
-            return Grid(view, cell.shape[0], True)
+            doubts = doubts_of(frame, ratio, target.bricks, *survey.patches(), LARGEST_TURN[quality])
+            if doubts.share < DOUBTFUL:
+                return _of_patches(target, survey, doubts, geometry)
     cells = DENSE_GRID_CELLS if triangles > DENSE_TRIANGLES else GRID_CELLS
     target, _ = _target(geometry, texel_frame(geometry.mesh, resolution), cells)
     cell, item, _ = _cells_of(target, None, triangles, geometry.vertices.device)
     return Grid(_built(target, geometry, cell, item), cell.shape[0], False)
+
+
+def _of_patches(target: Any, survey: Survey, doubts: Doubts, geometry: DeviceMesh) -> Grid:
+    """Patches, and the triangles that none stands for."""
+    target.patches, target.doubtful = doubts.patches, doubts.cells
+    cell, item = _patches_and_the_rest(target, survey, doubts.near)
+    view = _built(target, geometry, cell, item)
+    view.front = float(survey.front)
+    view.low, view.high = view.low - PATCH_RISE, view.high + PATCH_RISE
+    return Grid(view, cell.shape[0], True)
 
 
 def _target(geometry: DeviceMesh, frame: TexelFrame, cells: int) -> tuple[Any, float]:
@@ -458,11 +481,11 @@ def _brick_count(target: Any) -> int:
     return target.bricks[0] * target.bricks[1] * target.bricks[2]
 
 
-def _patches_and_the_rest(target: Any, survey: Survey) -> tuple[wp.array, wp.array]:
+def _patches_and_the_rest(target: Any, survey: Survey, near_doubt: wp.array) -> tuple[wp.array, wp.array]:
     """(cell, item) of all patches, and of the triangles that no patch stands for."""
     device = target.patches.device
     cell, item, touched = _cells_of(target, None, survey.count, device)
-    kept = survey.kept_triangles(touched)
+    kept = survey.kept_triangles(touched, near_doubt)
     if kept.shape[0] == 0:
         return cell, item
     more_cells, more_items, _ = _cells_of(target, kept, kept.shape[0], device)

@@ -62,6 +62,7 @@ class PatchTarget:
     fixed: wp.array(dtype=wp.vec4i)  # vertices in fixed-point texels, and a hash of their place
     faces: wp.array(dtype=wp.vec3i)
     size: wp.vec3i  # texels
+    first_texel: wp.vec3i  # of each axis' map
     cells_per_texel: float
     bricks: wp.vec3i
 
@@ -126,7 +127,13 @@ def patch_piece(target: PatchTarget, giver: Corners, axis: int, u: int, v: int, 
 
 
 @wp.func
-def lift_texels(target: PatchTarget, giver: Corners, place: int, patches_out: wp.array(dtype=Piece)) -> int:
+def lift_texels(
+    target: PatchTarget,
+    giver: Corners,
+    place: int,
+    patches_out: wp.array(dtype=Piece),
+    texel_out: wp.array(dtype=wp.int32),
+) -> int:
     """Count the texel centres that a triangle covers in the maps that face it; make their patches from ``place`` on,
     unless it is negative."""
     a, b, c = giver.a, giver.b, giver.c
@@ -142,6 +149,7 @@ def lift_texels(target: PatchTarget, giver: Corners, place: int, patches_out: wp
                         if place >= 0:
                             depth = interpolate(tri, at, unsnap(a[axis]), unsnap(b[axis]), unsnap(c[axis]))
                             patches_out[place + count] = patch_piece(target, giver, axis, u, v, depth, normal)
+                            texel_out[place + count] = target.first_texel[axis] + v * target.size[(axis + 1) % 3] + u
                         count += 1
     return count
 
@@ -152,6 +160,7 @@ def survey_triangles(
     # In:
     target: PatchTarget,
     no_patches: wp.array(dtype=Piece),
+    no_texels: wp.array(dtype=wp.int32),
     # Out, per chunk: small triangles; patches; triangles that give some, and their corners; what is left open; volume
     small_out: wp.array(dtype=wp.int32),
     patches_out: wp.array(dtype=wp.int32),
@@ -199,7 +208,7 @@ def survey_triangles(
                 giver.b = b
                 giver.c = c
                 giver.triangle = triangle
-                given = lift_texels(target, giver, -1, no_patches)
+                given = lift_texels(target, giver, -1, no_patches, no_texels)
                 if given > 0:
                     corners_out[begin + givers] = giver
                     givers += 1
@@ -221,11 +230,12 @@ def make_patches(
     corners: wp.array(dtype=Corners),
     # Out:
     patches_out: wp.array(dtype=Piece),
+    texel_out: wp.array(dtype=wp.int32),
 ):
     chunk = first + wp.tid()
     place = int(places[chunk])
     for k in range(givers[chunk]):
-        place += lift_texels(target, corners[CHUNK * chunk + k], place, patches_out)
+        place += lift_texels(target, corners[CHUNK * chunk + k], place, patches_out, texel_out)
 
 
 @kernel
@@ -234,6 +244,7 @@ def list_kept(
     # In:
     cell: wp.array(dtype=wp.int32),
     has_patch: wp.array(dtype=wp.uint8),
+    near_doubt: wp.array(dtype=wp.uint8),
     # Out, per chunk: triangles that no patch stands for, and their list
     count_out: wp.array(dtype=wp.int32),
     list_out: wp.array(dtype=wp.int32),
@@ -244,7 +255,7 @@ def list_kept(
     for triangle in range(begin, wp.min(begin + CHUNK, cell.shape[0])):
         is_kept = bool(cell[triangle] == KEPT)
         if not is_kept:
-            is_kept = has_patch[cell[triangle]] == wp.uint8(0)
+            is_kept = has_patch[cell[triangle]] == wp.uint8(0) or near_doubt[cell[triangle]] != wp.uint8(0)
         if is_kept:
             list_out[begin + count] = triangle
             count += 1
@@ -258,7 +269,7 @@ class Survey:
         self._device, self._triangles = geometry.vertices.device, len(geometry.faces)
         target = PatchTarget()
         target.fixed, target.faces = snapped_vertices(geometry, frame), geometry.faces
-        target.size = wp.vec3i(*frame.size)
+        target.size, target.first_texel = wp.vec3i(*frame.size), wp.vec3i(*frame.first_texels[:3])
         target.cells_per_texel, target.bricks = cells_per_texel, bricks
         self._target = target
         chunks = chunk_count(self._triangles)
@@ -268,8 +279,9 @@ class Survey:
         self._open = wp.empty(chunks, dtype=wp.uint64, device=self._device)
         self._volume = wp.empty(chunks, dtype=wp.float64, device=self._device)
         nothing = wp.empty(0, dtype=Piece, device=self._device)
+        nowhere = wp.empty(0, dtype=wp.int32, device=self._device)
         outputs = [small, counts, self._givers, self._corners, self._open, self._volume, self._cell]
-        launch_chunks(survey_triangles, self._triangles, [target, nothing, *outputs], self._device)
+        launch_chunks(survey_triangles, self._triangles, [target, nothing, nowhere, *outputs], self._device)
         self._places, self.count = exclusive_scan(counts)
         self.small = int(small.numpy().sum())
         """Triangles of at most two texels."""
@@ -282,17 +294,18 @@ class Survey:
             return 0
         return int(np.sign(self._volume.numpy().sum()))
 
-    def patches(self) -> wp.array:
-        """(count,) ``Piece``."""
+    def patches(self) -> tuple[wp.array, wp.array]:
+        """(count,) ``Piece``, and (count,) int32, the texel of each, the three axes' maps in a row."""
         made = wp.empty(self.count, dtype=Piece, device=self._device)
-        inputs: list[Any] = [self._target, self._places, self._givers, self._corners, made]
+        texel = wp.empty(self.count, dtype=wp.int32, device=self._device)
+        inputs: list[Any] = [self._target, self._places, self._givers, self._corners, made, texel]
         launch_chunks(make_patches, self._triangles, inputs, self._device)
-        return made
+        return made, texel
 
-    def kept_triangles(self, has_patch: wp.array) -> wp.array:
+    def kept_triangles(self, has_patch: wp.array, near_doubt: wp.array) -> wp.array:
         """The triangles that no patch stands for, in order: large ones, and those in cells that no patch touches, such
-        as wires between texel centres."""
+        as wires between texel centres, or near doubtful ones."""
         counts = wp.zeros(chunk_count(self._triangles) + 1, dtype=wp.int32, device=self._device)
         listed = wp.empty(self._triangles, dtype=wp.int32, device=self._device)
-        launch_chunks(list_kept, self._triangles, [self._cell, has_patch, counts, listed], self._device)
+        launch_chunks(list_kept, self._triangles, [self._cell, has_patch, near_doubt, counts, listed], self._device)
         return gather_lists(listed, counts)

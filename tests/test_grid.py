@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+import trimesh
 import warp as wp
 from stress_cases.judge import rays_about
 
@@ -53,6 +54,43 @@ def test_dense_meshes_become_patches(quality: str, wrong_hits: float, wrong_miss
     assert found["wrong_hits"] <= wrong_hits, found
     assert found["wrong_misses"] <= wrong_misses, found
     assert found["p99"] <= p99, found
+
+
+def rough_ball(rise: float) -> ldtrefl.Mesh:
+    """A ball of 200,000 triangles whose vertices rise and fall at random by ``rise`` radii."""
+    ball = shapes.make("sphere", {"segments": [500, 200]})
+    place, number = np.unique(ball.vertices.round(9), axis=0, return_inverse=True)
+    rises = 1.0 + rise * np.random.default_rng(3).normal(size=(len(place), 1))
+    return ldtrefl.Mesh(ball.vertices * rises[number.ravel()], ball.faces)
+
+
+def many_triangled_box() -> ldtrefl.Mesh:
+    """A turned box, each side of 131,072 triangles."""
+    box = trimesh.creation.box(extents=(1.0, 1.5, 2.0))
+    for _ in range(8):
+        box = box.subdivide()
+    turned = trimesh.transformations.rotation_matrix(0.7, (1, 2, 3))[:3, :3]
+    return ldtrefl.Mesh(box.vertices @ turned.T, box.faces)
+
+
+@pytest.mark.parametrize("quality", ["balanced", "fast"])
+def test_rough_surfaces_stay_triangles(quality: str) -> None:
+    """Of a detailed scan no triangle can stand for its neighbours, however small it is."""
+    mesh = rough_ball(0.003)
+    maps = ldtrefl.peel(mesh.vertices, mesh.faces, 128, quality=quality)
+    smooth = rough_ball(0.0)
+    assert ldtrefl.peel(smooth.vertices, smooth.faces, 128, quality=quality).grid.patches and not maps.grid.patches
+    found = differences(mesh, maps, 60_000, 8)
+    assert found["wrong_hits"] + found["wrong_misses"] <= 0.01 and found["p99"] < 0.01, found
+
+
+@pytest.mark.parametrize(("quality", "wrong"), [("balanced", 0.2), ("fast", 1.5)])
+def test_patches_end_at_edges(quality: str, wrong: float) -> None:
+    mesh = many_triangled_box()
+    maps = ldtrefl.peel(mesh.vertices, mesh.faces, quality=quality)
+    assert maps.grid.patches
+    found = differences(mesh, maps, 100_000, 9)
+    assert found["wrong_hits"] <= wrong and found["wrong_misses"] <= 0.05 and found["p99"] <= 0.2, found
 
 
 def rays_from_outside(count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:

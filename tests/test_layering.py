@@ -31,6 +31,7 @@ BOTTOM_TO_TOP = (
     "peel",
     "grid",
     "patches",
+    "doubts",
     "grid_build",
     "trace",
     "march",
