@@ -106,25 +106,29 @@ class DeviceObject:
 
 
 class DeviceScene:
-    """A scene uploaded to a device."""
+    """A scene uploaded to a device; what is the same as ``before`` is taken over."""
 
-    def __init__(self, scene: Scene, device: wp.Device) -> None:
+    def __init__(self, scene: Scene, device: wp.Device, before: DeviceScene | None = None) -> None:
         self.scene = scene
         self.device = device
         self.device_from_world = _device_from_world(scene)
-        meshes: dict[int, DeviceMesh] = {}
+        former = [] if before is None else before.objects
+        same_space = before is not None and np.array_equal(self.device_from_world, before.device_from_world)
+        meshes = {id(entry.geometry.mesh): entry.geometry for entry in former}
         self.objects: list[DeviceObject] = []
         first_triangle = 0
         for index, source in enumerate(scene.objects):
             mesh = source.geometry
             if id(mesh) not in meshes:
                 meshes[id(mesh)] = DeviceMesh(mesh, device)
-            placed = self._placed(index, source, meshes[id(mesh)], first_triangle)
-            self.objects.append(placed)
+            if same_space and former[index].source is source:
+                self.objects.append(former[index])
+            else:
+                self.objects.append(self._placed(index, source, meshes[id(mesh)], first_triangle))
             first_triangle += len(mesh.faces)
         self.triangle_count = first_triangle
         self.records = wp.array([entry.record for entry in self.objects], dtype=ObjectRecord, device=device)
-        self.lighting = self._lighting()
+        self.lighting = self._lighting(before)
         self.look_from(scene.camera)
 
     @property
@@ -143,6 +147,13 @@ class DeviceScene:
         counts = [len(entry.geometry.faces) if entry.source.is_reflector else 0 for entry in self.objects]
         firsts = np.cumsum([0, *counts])
         return wp.array(firsts[:-1].astype(np.int32), dtype=wp.int32, device=self.device), int(firsts[-1])
+
+    def moved_since(self, before: DeviceScene) -> set[int] | None:
+        """Numbers of the objects that have moved since a scene that this one comes from; None if all may look different
+        in device space, because it is another one."""
+        if not np.array_equal(self.device_from_world, before.device_from_world):
+            return None
+        return {now.index for now, then in zip(self.objects, before.objects, strict=True) if now is not then}
 
     def look_from(self, camera: Camera) -> None:
         """Turn the environment to the camera's ``up``."""
@@ -195,7 +206,7 @@ class DeviceScene:
         record.part_texture = wp.array(table, dtype=wp.vec3i, device=self.device)
         record.texels = wp.array(pool, dtype=wp.vec3, device=self.device)
 
-    def _lighting(self) -> Any:
+    def _lighting(self, before: DeviceScene | None) -> Any:
         scene = self.scene
         record = LightingRecord()
         lights = [self._light(light) for light in scene.lights]
@@ -206,9 +217,12 @@ class DeviceScene:
         )
         record.ambient = wp.vec3(*scene.lighting.ambient)
         record.sky, record.ground = wp.vec3(*scene.environment.sky), wp.vec3(*scene.environment.ground)
-        image = scene.environment_image
-        image = np.zeros((0, 0, 3), np.float32) if image is None else image
-        record.image = wp.array(image, dtype=wp.vec3, device=self.device)
+        if before is not None and before.scene.environment is scene.environment:
+            record.image = before.lighting.image
+        else:
+            image = scene.environment_image
+            image = np.zeros((0, 0, 3), np.float32) if image is None else image
+            record.image = wp.array(image, dtype=wp.vec3, device=self.device)
         record.shadows = int(scene.lighting.shadows)
         return record
 

@@ -7,6 +7,7 @@ alone costs more than drawing once; ``tools/gbuffer_choice.py`` measures both.
 from __future__ import annotations
 
 import functools
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -387,39 +388,101 @@ class GBuffer:
         return position, normal
 
 
+@dataclass(frozen=True, eq=False)
+class Drawing:
+    """A z-buffer, and the corners of what is drawn in it."""
+
+    keys: wp.array
+    """(h * w,) int64: nearness of what a pixel sees, then its triangle; 0 where nothing is seen."""
+    corners: wp.array
+    """(all objects' vertices,) vec3d in pixels."""
+
+    @classmethod
+    def empty(cls, scene: DeviceScene, camera: Camera) -> Drawing:
+        """Nothing drawn yet."""
+        keys = wp.zeros(camera.width * camera.height, dtype=wp.int64, device=scene.device)
+        return cls(keys, wp.empty(_first_vertices(scene)[-1], dtype=wp.vec3d, device=scene.device))
+
+    def over(self) -> Drawing:
+        """A copy to draw other objects over."""
+        return Drawing(wp.clone(self.keys), self.corners)
+
+    def add(self, scene: DeviceScene, camera: Camera, numbers: Iterable[int]) -> None:
+        """Draw the objects of these numbers."""
+        device, first_vertices, from_world = scene.device, _first_vertices(scene), pixels_from_world(camera)
+        for entry in (scene.objects[number] for number in numbers):
+            mesh, rows = entry.geometry, [wp.vec4d(*row) for row in from_world @ entry.world_from_unit]
+            first_vertex = first_vertices[entry.index]
+            inputs = [mesh.vertices, *rows, first_vertex, self.corners]
+            launch.launch(project_vertices, len(mesh.vertices), inputs, device)
+            triangles = len(mesh.faces)
+            projected = ProjectedMesh()
+            projected.faces, projected.corners = mesh.faces, self.corners
+            projected.first_vertex, projected.first_triangle = first_vertex, entry.record.first_triangle
+            projected.width, projected.height = camera.width, camera.height
+            counts = wp.zeros(chunk_count(triangles) + 1, dtype=wp.int32, device=device)
+            listed = wp.empty(triangles, dtype=wp.int32, device=device)
+            launch_chunks(draw_small_triangles, triangles, [projected, self.keys, counts, listed], device)
+            large = gather_lists(listed, counts)
+            bands = large.shape[0] * -(-camera.height // int(BAND))
+            launch.launch(draw_large_triangles, bands, [projected, large, self.keys], device)
+
+    def resolved(self, scene: DeviceScene, camera: Camera) -> GBuffer:
+        """What each pixel sees."""
+        device, pixels = scene.device, camera.width * camera.height
+        view = GBufferView()
+        view.object, view.triangle = (wp.empty(pixels, dtype=wp.int32, device=device) for _ in range(2))
+        view.barycentrics = wp.empty(pixels, dtype=wp.vec2, device=device)
+        view.camera = camera_view(camera, scene.device_from_world)
+        if scene.objects:
+            firsts = wp.array([entry.record.first_triangle for entry in scene.objects], dtype=wp.int32, device=device)
+            starts = wp.array(_first_vertices(scene)[:-1], dtype=wp.int32, device=device)
+            inputs = [self.keys, firsts, starts, scene.records, self.corners, camera.width]
+            outputs = [view.object, view.triangle, view.barycentrics]
+            launch.launch(resolve_pixels, pixels, [*inputs, *outputs], device)
+        else:
+            view.object.fill_(-1)
+            view.triangle.fill_(-1)
+        return GBuffer(scene, camera, view)
+
+
+def _first_vertices(scene: DeviceScene) -> list[int]:
+    """Each object's first vertex among all objects', and the total."""
+    return np.cumsum([0] + [len(entry.geometry.vertices) for entry in scene.objects]).tolist()
+
+
 def draw_gbuffer(scene: DeviceScene, camera: Camera, *, without: int = -1) -> GBuffer:
     """What ``camera`` sees of the scene, object number ``without`` left out."""
-    device, width, height = scene.device, camera.width, camera.height
-    pixels = width * height
-    keys = wp.zeros(pixels, dtype=wp.int64, device=device)
-    first_vertices = np.cumsum([0] + [len(entry.geometry.vertices) for entry in scene.objects]).tolist()
-    corners = wp.empty(first_vertices[-1], dtype=wp.vec3d, device=device)
-    from_world = pixels_from_world(camera)
-    for entry, first_vertex in zip(scene.objects, first_vertices, strict=False):
-        if entry.index == without:
-            continue
-        mesh, rows = entry.geometry, [wp.vec4d(*row) for row in from_world @ entry.world_from_unit]
-        launch.launch(project_vertices, len(mesh.vertices), [mesh.vertices, *rows, first_vertex, corners], device)
-        triangles = len(mesh.faces)
-        projected = ProjectedMesh()
-        projected.faces, projected.corners = mesh.faces, corners
-        projected.first_vertex, projected.first_triangle = first_vertex, entry.record.first_triangle
-        projected.width, projected.height = width, height
-        counts = wp.zeros(chunk_count(triangles) + 1, dtype=wp.int32, device=device)
-        listed = wp.empty(triangles, dtype=wp.int32, device=device)
-        launch_chunks(draw_small_triangles, triangles, [projected, keys, counts, listed], device)
-        large = gather_lists(listed, counts)
-        launch.launch(draw_large_triangles, large.shape[0] * -(-height // int(BAND)), [projected, large, keys], device)
-    view = GBufferView()
-    view.object, view.triangle = (wp.empty(pixels, dtype=wp.int32, device=device) for _ in range(2))
-    view.barycentrics = wp.empty(pixels, dtype=wp.vec2, device=device)
-    view.camera = camera_view(camera, scene.device_from_world)
-    if scene.objects:
-        firsts = wp.array([entry.record.first_triangle for entry in scene.objects], dtype=wp.int32, device=device)
-        starts = wp.array(first_vertices[:-1], dtype=wp.int32, device=device)
-        inputs = [keys, firsts, starts, scene.records, corners, width, view.object, view.triangle, view.barycentrics]
-        launch.launch(resolve_pixels, pixels, inputs, device)
-    else:
-        view.object.fill_(-1)
-        view.triangle.fill_(-1)
-    return GBuffer(scene, camera, view)
+    drawing = Drawing.empty(scene, camera)
+    drawing.add(scene, camera, [number for number in range(len(scene.objects)) if number != without])
+    return drawing.resolved(scene, camera)
+
+
+class KeptDrawing:
+    """G-buffers of frame after frame: while the camera stays, what stands still is drawn once."""
+
+    def __init__(self) -> None:
+        self._last: tuple[DeviceScene, Camera] | None = None
+        self._still: Drawing | None = None
+        self._moving: set[int] = set()
+        """What is not in it."""
+
+    def gbuffer(self, scene: DeviceScene, camera: Camera) -> GBuffer:
+        """What ``camera`` sees of a scene that comes from the last one."""
+        everything = set(range(len(scene.objects)))
+        moved = everything
+        if self._last is not None and self._last[1] == camera:
+            before = self._last[0].objects
+            # Pixels do not depend on device space: only what was placed anew has moved.
+            moved = {now.index for now in scene.objects if now.source is not before[now.index].source}
+        self._last = scene, camera
+        if moved == everything:
+            self._still = None
+            return draw_gbuffer(scene, camera)
+        if self._still is None or not moved <= self._moving:
+            self._moving = moved
+            self._still = Drawing.empty(scene, camera)
+            self._still.add(scene, camera, sorted(everything - moved))
+        drawing = self._still.over()
+        drawing.add(scene, camera, sorted(self._moving))
+        return drawing.resolved(scene, camera)

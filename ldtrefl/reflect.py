@@ -10,7 +10,7 @@ Device space throughout; directions have unit length.
 """
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Set
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,6 +22,7 @@ from ldtrefl.camera import camera_ray
 from ldtrefl.cull import Culled
 from ldtrefl.device_scene import DeviceScene, LightingRecord, ObjectRecord
 from ldtrefl.gbuffer import GBuffer, GBufferView, pixel_view
+from ldtrefl.kept import Followed, changed_runs, put_hits, rays_of_runs
 from ldtrefl.rays import HitBuffer, RayBuffer, Regions, lowest_bit, meets_sphere, object_bits, sphere_entry
 from ldtrefl.shade import (
     Surface,
@@ -394,46 +395,95 @@ def follow_rays(
     max_bounces: int,
     skips: Skips,
     stats: launch.Stats,
-) -> tuple[wp.array, FirstHits]:
-    """Reflected radiance of every pixel, (h * w,) vec3, and where the first rays end.
+    before: Followed | None = None,
+    moved: Set[int] = frozenset(),
+) -> tuple[Followed, FirstHits]:
+    """Follow the rays of the pixels that see a reflector.
 
-    ``cull(rays, bounce)`` says which objects rays may meet; ``bind(objects)`` makes the tracer ready for those.
+    Args:
+        cull: ``cull(rays, bounce)`` says which objects rays may meet.
+        bind: ``bind(objects)`` makes the tracer ready for those.
+        before: the last frame's, in the same device space.
+        moved: numbers of the objects that have moved since. Rays that are the same and could not meet one of them, nor
+            can now, are not followed again.
+
+    Returns:
+        what became of them, and where the first rays end.
     """
     scene, device = gbuffer.scene, gbuffer.scene.device
-    everything = {entry.index for entry in scene.objects}
     shadows = bool(scene.lighting.shadows)
     with stats.stage("march", device):
         rays = mirror_rays(gbuffer)
-    n = alive = rays.pixel.shape[0]
-    radiance = wp.zeros(gbuffer.pixel_count, dtype=wp.vec3, device=device)
-    first_hits = None
-    for bounce in range(max_bounces):
+    with stats.stage("cull", device):
+        culled = cull(rays, 0)
+        runs = None
+        if before is not None and max_bounces == 1 and not shadows:
+            runs = changed_runs(before, rays, culled.regions, moved)
+    needed = everything = {entry.index for entry in scene.objects}
+    if skips.maps and not shadows:
+        needed = culled.shown
+    bound, n = bind(needed), rays.pixel.shape[0]
+    if before is not None and runs is not None:
+        made = before.copied(rays, culled.regions)
+        numbers, part, regions = rays_of_runs(made, runs)
+        if len(runs):
+            hits = _hit_buffer(numbers.shape[0], device)
+            _bounce(gbuffer, part, regions, bound, hits, made.radiance, True, skips, stats)
+            launch.launch(put_hits, numbers.shape[0], [numbers, hits, made.hits], device)
+        stats.count("rays_kept", n - numbers.shape[0])
+    else:
+        black = wp.zeros(gbuffer.pixel_count, dtype=wp.vec3, device=device)
+        made = Followed(rays, culled.regions, _hit_buffer(n, device), black)
+        going, hits = _copy_to_send_on(rays, max_bounces > 1), made.hits
+        for bounce in range(max_bounces):
+            is_last = bounce + 1 == max_bounces
+            if not _bounce(gbuffer, going, culled.regions, bound, hits, black, is_last, skips, stats):
+                break
+            with stats.stage("cull", device):
+                culled = cull(going, bounce + 1)
+            bound = bind(culled.shown if skips.maps and not shadows else everything)
+            hits = _hit_buffer(n, device)
+    shape = (gbuffer.camera.height, gbuffer.camera.width)
+    return made, FirstHits(shape, rays, made.hits, scene.device_units_per_world_unit)
+
+
+def _copy_to_send_on(rays: Any, beyond_one: bool) -> Any:
+    """The rays, to be sent on without changing these."""
+    own = RayBuffer()
+    own.pixel, own.source = rays.pixel, wp.clone(rays.source)
+    own.origin, own.direction, own.weight = rays.origin, rays.direction, rays.weight
+    if beyond_one:
+        own.origin, own.direction, own.weight = wp.clone(rays.origin), wp.clone(rays.direction), wp.clone(rays.weight)
+    return own
+
+
+def _bounce(
+    gbuffer: GBuffer,
+    rays: Any,
+    regions: Any,
+    bound: BoundTracer,
+    hits: Any,
+    radiance: wp.array,
+    is_last: bool,
+    skips: Skips,
+    stats: launch.Stats,
+) -> int:
+    """Find where rays end and shade that; the number of rays that go on."""
+    scene, device, n = gbuffer.scene, gbuffer.scene.device, rays.pixel.shape[0]
+    with stats.stage("march", device):
+        inputs = [rays, scene.records, bound.views, regions, hits]
+        launch.launch(closest_hits_kernel(bound.tracer, skips.bounds), n, inputs, device)
+        alive = int(np.count_nonzero(rays.source.numpy() >= 0))
+        searches = int(hits.searches.numpy().sum(dtype=np.int64))
         stats.count("rays", alive)
-        with stats.stage("cull", device):
-            culled = cull(rays, bounce)
-        bound = bind(everything if shadows or not skips.maps else culled.shown)
-        with stats.stage("march", device):
-            if bounce < 2:  # the first bounce's are kept
-                hits = _hit_buffer(n, device)
-            inputs = [rays, scene.records, bound.views, culled.regions, hits]
-            launch.launch(closest_hits_kernel(bound.tracer, skips.bounds), n, inputs, device)
-            stats.count("steps", int(hits.steps.numpy().sum(dtype=np.int64)))
-            searches = int(hits.searches.numpy().sum(dtype=np.int64))
-            stats.count("searches", searches)
-            stats.count("searches_saved", alive * (len(scene.objects) - 1) - searches)
-        if first_hits is None:
-            shape = (gbuffer.camera.height, gbuffer.camera.width)
-            first_hits = FirstHits(shape, rays, hits, scene.device_units_per_world_unit)
-        with stats.stage("shade", device):
-            shadow = bound if shadows else no_shadows(device)
-            is_last = int(bounce + 1 == max_bounces)
-            inputs = [hits, scene.records, scene.lighting, shadow.views, is_last, rays, radiance]
-            launch.launch(shade_hits_kernel(shadow.tracer), n, inputs, device)
-            alive = 0 if is_last else int((rays.source.numpy() >= 0).sum())
-        if alive == 0:
-            break
-    assert first_hits is not None
-    return radiance, first_hits
+        stats.count("steps", int(hits.steps.numpy().sum(dtype=np.int64)))
+        stats.count("searches", searches)
+        stats.count("searches_saved", alive * (len(scene.objects) - 1) - searches)
+    with stats.stage("shade", device):
+        shadow = bound if scene.lighting.shadows else no_shadows(device)
+        inputs = [hits, scene.records, scene.lighting, shadow.views, int(is_last), rays, radiance]
+        launch.launch(shade_hits_kernel(shadow.tracer), n, inputs, device)
+        return 0 if is_last else int(np.count_nonzero(rays.source.numpy() >= 0))
 
 
 def _hit_buffer(n: int, device: wp.Device) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,12 +11,12 @@ import warp as wp
 
 from ldtrefl import launch
 from ldtrefl.device_scene import DeviceScene
-from ldtrefl.gbuffer import GBuffer, draw_gbuffer
+from ldtrefl.gbuffer import GBuffer, KeptDrawing, draw_gbuffer
 from ldtrefl.launch import Stats
 from ldtrefl.methods import find_method
 from ldtrefl.methods.base import Reflection
 from ldtrefl.reflect import FirstHits, no_shadows, shade_gbuffer
-from ldtrefl.scene import Camera, Scene
+from ldtrefl.scene import Camera, Scene, Vector
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,8 +49,18 @@ def add_reflection(
     image_out[i] = direct[i] + wp.cw_mul(mirror[i], reflected[i])
 
 
+@dataclass(frozen=True, eq=False)
+class _Shaded:
+    """What a frame is composed of."""
+
+    gbuffer: GBuffer
+    direct: wp.array
+    mirror: wp.array
+    reflection: Reflection
+
+
 class Renderer:
-    """Renders frames of one scene by one method; keeps G-buffer, maps and trees between frames."""
+    """Renders frames of one scene by one method; keeps between frames what the next one can use."""
 
     def __init__(self, scene: Scene, method: str | None = None, device: str | None = None, **options: Any) -> None:
         """Upload the scene.
@@ -68,34 +79,69 @@ class Renderer:
         self.scene = scene
         self._device_scene = DeviceScene(scene, launch.resolve_device(device))
         self._method = kind(self._device_scene, config)
-        self._gbuffer: GBuffer | None = None
+        self._drawing = KeptDrawing()
+        self._last: _Shaded | None = None
+
+    def move(
+        self,
+        name: str,
+        *,
+        translate: Vector | None = None,
+        rotate: Sequence[float] | None = None,
+        scale: float | Vector | None = None,
+    ) -> None:
+        """Place the object called ``name`` anew, as in a scene file; what is not given stays.
+
+        Its maps move with it, and the next frame does again only what the move can have changed.
+
+        Raises:
+            InputError: an unknown object, or a value that is not allowed.
+        """
+        given = {"translate": translate, "rotate": rotate, "scale": scale}
+        changes = {key: value for key, value in given.items() if value is not None}
+        self.scene = self.scene.with_object(name, **changes)
+        self._device_scene = DeviceScene(self.scene, self._device_scene.device, self._device_scene)
+        self._method.place(self._device_scene)
 
     def render(self, camera: Camera | None = None) -> Frame:
         """Render a frame, seen by ``camera`` or else by the scene's own."""
         camera = camera or self.scene.camera
         scene, device, stats = self._device_scene, self._device_scene.device, Stats()
         scene.look_from(camera)
-        with stats.stage("gbuffer", device):
-            if self._gbuffer is None or self._gbuffer.camera != camera or not self._method.skips.frames:
-                self._gbuffer = draw_gbuffer(scene, camera)
-            gbuffer = self._gbuffer
-            mask = gbuffer.reflector_mask
+        last = self._last if self._method.skips.frames else None
+        if last is not None and last.gbuffer.camera == camera and last.gbuffer.scene is scene:
+            stats.count("frames_kept", 1)
+            shaded = last
+        else:
+            shaded = self._shaded(camera, stats)
+        self._last = shaded
+        gbuffer, reflection = shaded.gbuffer, shaded.reflection
+        mask = gbuffer.reflector_mask
         stats.count("pixels", gbuffer.pixel_count)
         stats.count("reflector_pixels", int(mask.sum()))
         stats.count("rays", 0)
-        shadow = self._method.shadow_tracer(stats) if self.scene.lighting.shadows else no_shadows(device)
-        with stats.stage("shade", device):
-            direct, mirror = shade_gbuffer(gbuffer, shadow)
-        if mask.any() or not self._method.skips.reflection:
-            reflection = self._method.reflect(gbuffer, stats)
-        else:
-            reflection = Reflection(wp.zeros(gbuffer.pixel_count, dtype=wp.vec3, device=device))
         with stats.stage("composite", device):
             image = wp.empty(gbuffer.pixel_count, dtype=wp.vec3, device=device)
-            launch.launch(add_reflection, gbuffer.pixel_count, [direct, mirror, reflection.radiance, image], device)
+            inputs = [shaded.direct, shaded.mirror, reflection.radiance, image]
+            launch.launch(add_reflection, gbuffer.pixel_count, inputs, device)
             shape = (camera.height, camera.width, 3)
             picture, reflected = (array.numpy().reshape(shape) for array in (image, reflection.radiance))
         return Frame(picture, reflected, mask, stats, reflection.hits)
+
+    def _shaded(self, camera: Camera, stats: Stats) -> _Shaded:
+        """G-buffer, direct light and reflections."""
+        scene, device, method = self._device_scene, self._device_scene.device, self._method
+        with stats.stage("gbuffer", device):
+            gbuffer = self._drawing.gbuffer(scene, camera) if method.skips.frames else draw_gbuffer(scene, camera)
+            sees_reflector = bool(gbuffer.reflector_mask.any())
+        shadow = method.shadow_tracer(stats) if self.scene.lighting.shadows else no_shadows(device)
+        with stats.stage("shade", device):
+            direct, mirror = shade_gbuffer(gbuffer, shadow)
+        if sees_reflector or not method.skips.reflection:
+            reflection = method.reflect(gbuffer, stats)
+        else:
+            reflection = Reflection(wp.zeros(gbuffer.pixel_count, dtype=wp.vec3, device=device))
+        return _Shaded(gbuffer, direct, mirror, reflection)
 
     def texel_sizes(self, resolution: int) -> np.ndarray:
         """(objects,) length in the world of a texel of each object's maps at ``resolution``."""

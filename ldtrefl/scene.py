@@ -20,7 +20,7 @@ from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, TypeAda
 from pydantic.dataclasses import dataclass
 
 from ldtrefl import shapes
-from ldtrefl.errors import InputError, first_fault
+from ldtrefl.errors import InputError, first_fault, unknown_name
 from ldtrefl.image import load_image
 from ldtrefl.mesh import Mesh, load_mesh
 
@@ -252,6 +252,36 @@ class Scene:
     def with_camera(self, camera: Camera) -> Scene:
         """The same scene seen by another camera."""
         return dataclasses.replace(self, camera=camera)
+
+    def number_of(self, name: str) -> int:
+        """The number of the object called ``name``, the first of several.
+
+        Raises:
+            InputError: there is none.
+        """
+        names = [entry.name for entry in self.objects]
+        if name not in names:
+            raise unknown_name("object", name, names)
+        return names.index(name)
+
+    def with_object(self, name: str, **changes: Any) -> Scene:
+        """The same scene with other values for fields of the object called ``name``.
+
+        Raises:
+            InputError: an unknown object or field, or a value that is not allowed.
+        """
+        number = self.number_of(name)
+        known = {entry.name for entry in dataclasses.fields(Object)}
+        for field in changes:
+            if field not in known:
+                raise unknown_name("field of an object", field, known)
+        try:
+            changed = dataclasses.replace(self.objects[number], **changes)
+        except ValidationError as error:
+            raise first_fault(error, {}).within(f"object '{name}'") from None
+        if not {"mesh", "shape", "params"} & set(changes):
+            changed.__dict__["geometry"] = self.objects[number].geometry  # not made again
+        return dataclasses.replace(self, objects=(*self.objects[:number], changed, *self.objects[number + 1 :]))
 
     @functools.cached_property
     def environment_image(self) -> np.ndarray | None:

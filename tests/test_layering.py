@@ -41,6 +41,7 @@ BOTTOM_TO_TOP = (
     "gbuffer",
     "rays",
     "cull",
+    "kept",
     "reflect",
     "methods.base",
     "methods",

@@ -56,6 +56,10 @@ class Method(abc.ABC):
         self.config = config
         self.skips = chosen(config.skip)
 
+    def place(self, scene: DeviceScene) -> None:
+        """Go on with a scene in which some objects have moved, their meshes and all else the same."""
+        self.scene = scene
+
     @abc.abstractmethod
     def reflect(self, gbuffer: GBuffer, stats: Stats) -> Reflection:
         """The reflections in what the camera sees. Called only if it sees a reflector."""

@@ -56,4 +56,5 @@ class Bvh(Method):
         bounces = self.config.max_bounces or self.scene.scene.reflection.max_bounces
         everything = not_culled(self.scene)
         cull, bind = (lambda _rays, _bounce: everything), (lambda _objects: self._bind(stats))
-        return Reflection(*follow_rays(gbuffer, cull, bind, bounces, self.skips, stats))
+        followed, hits = follow_rays(gbuffer, cull, bind, bounces, self.skips, stats)
+        return Reflection(followed.radiance, hits)

@@ -19,7 +19,7 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from ldtrefl import launch
-from ldtrefl.device_scene import DeviceObject, ObjectRecord
+from ldtrefl.device_scene import DeviceObject, DeviceScene, ObjectRecord
 from ldtrefl.gbuffer import GBuffer, GBufferView, draw_gbuffer, pixel_view
 from ldtrefl.launch import Stats
 from ldtrefl.methods.base import CONFIG, CommonConfig, Method, Reflection
@@ -95,6 +95,11 @@ class EnvironmentMap(Method):
 
         resolution: Annotated[int, Field(strict=True, ge=1, le=4096)] = 512
         """Pixels along a side of each face, 1 to 4096."""
+
+    def place(self, scene: DeviceScene) -> None:
+        """Go on with a scene in which some objects have moved: every cube map may show them."""
+        super().place(scene)
+        self.__dict__.pop("_cubes", None)
 
     def shadow_tracer(self, stats: Stats) -> BoundTracer:
         """A cube map has no shadow rays of its own: a BVH answers them."""

@@ -22,8 +22,10 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from ldtrefl.cull import Culled, CullTest, cull_rays, not_culled
+from ldtrefl.device_scene import DeviceScene
 from ldtrefl.gbuffer import GBuffer
 from ldtrefl.grid_build import Quality
+from ldtrefl.kept import Followed
 from ldtrefl.launch import Stats
 from ldtrefl.ldt import (
     BINARY_STEPS,
@@ -36,6 +38,7 @@ from ldtrefl.ldt import (
 from ldtrefl.march import TRACERS
 from ldtrefl.methods.base import CONFIG, CommonConfig, Method, Reflection
 from ldtrefl.reflect import BoundTracer, follow_rays
+from ldtrefl.scene import Camera
 
 
 class Ldt(Method):
@@ -61,6 +64,9 @@ class Ldt(Method):
         """Reflection regions: safe (loses nothing), flat (the paper's, for flat mirror triangles)."""
         max_bounces: Annotated[int, Field(strict=True, ge=1, le=64)] | None = None
         """Reflections in reflections; the scene's number if not given."""
+
+    _last: tuple[Camera, DeviceScene, Followed] | None = None
+    """Of the last frame."""
 
     def _bind(self, needed: set[int], stats: Stats) -> BoundTracer:
         """The tracer, once the maps of the objects in ``needed`` are peeled."""
@@ -100,7 +106,19 @@ class Ldt(Method):
                 return not_culled(self.scene)
             return cull_rays(gbuffer, rays, bounce, self.config.cull, stats)
 
-        followed = follow_rays(gbuffer, cull, lambda needed: self._bind(needed, stats), bounces, self.skips, stats)
+        def bind(needed: set[int]) -> BoundTracer:
+            return self._bind(needed, stats)
+
+        before, moved = self._before_of(gbuffer)
+        followed, hits = follow_rays(gbuffer, cull, bind, bounces, self.skips, stats, before, moved)
+        self._last = (gbuffer.camera, self.scene, followed)
         meshes = {id(entry.geometry) for entry in self.scene.objects}
         stats.count("objects_skipped", len(meshes) - len(self.__dict__["_maps"]))
-        return Reflection(*followed)
+        return Reflection(followed.radiance, hits)
+
+    def _before_of(self, gbuffer: GBuffer) -> tuple[Followed | None, set[int]]:
+        """The last frame's rays, if they were the same camera's, and what has moved since; or nothing."""
+        if self._last is None or self._last[0] != gbuffer.camera or not self.skips.frames:
+            return None, set()
+        moved = self.scene.moved_since(self._last[1])
+        return (None, set()) if moved is None else (self._last[2], moved)
