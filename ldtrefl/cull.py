@@ -234,11 +234,12 @@ class Culled:
 
 
 def not_culled(scene: DeviceScene) -> Culled:
-    """Every ray may meet every object."""
+    """Every ray may meet every object but its own."""
     regions = Regions()
     regions.bits = wp.empty((0, 0), dtype=wp.uint32, device=scene.device)
     regions.rows = wp.empty(0, dtype=wp.int32, device=scene.device)
-    return Culled(regions, {entry.index for entry in scene.objects})
+    mirrors = {entry.index for entry in scene.reflectors}
+    return Culled(regions, {entry.index for entry in scene.objects if mirrors - {entry.index}})
 
 
 def cull_rays(gbuffer: GBuffer, rays: Any, bounce: int, test: CullTest, stats: launch.Stats) -> Culled:

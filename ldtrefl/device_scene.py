@@ -106,11 +106,17 @@ class DeviceObject:
 
 
 class DeviceScene:
-    """A scene uploaded to a device; what is the same as ``before`` is taken over."""
+    """A scene uploaded to a device; what is the same as ``before`` is taken over.
 
-    def __init__(self, scene: Scene, device: wp.Device, before: DeviceScene | None = None) -> None:
+    Without ``skip_attributes`` normals and texture coordinates are uploaded even where shading does not use them.
+    """
+
+    def __init__(
+        self, scene: Scene, device: wp.Device, before: DeviceScene | None = None, *, skip_attributes: bool = True
+    ) -> None:
         self.scene = scene
         self.device = device
+        self._skip_attributes = skip_attributes
         self.device_from_world = _device_from_world(scene)
         former = [] if before is None else before.objects
         same_space = before is not None and np.array_equal(self.device_from_world, before.device_from_world)
@@ -130,6 +136,13 @@ class DeviceScene:
         self.records = wp.array([entry.record for entry in self.objects], dtype=ObjectRecord, device=device)
         self.lighting = self._lighting(before)
         self.look_from(scene.camera)
+
+    @property
+    def attribute_bytes(self) -> int:
+        """Bytes of the normals and texture coordinates on the device."""
+        meshes = {id(entry.geometry): entry.geometry for entry in self.objects}.values()
+        made = [array for mesh in meshes for name, array in vars(mesh).items() if name in ("normals", "uvs")]
+        return sum(array.size * wp.types.type_size_in_bytes(array.dtype) for array in made)
 
     @property
     def device_units_per_world_unit(self) -> float:
@@ -179,7 +192,8 @@ class DeviceScene:
         # An object that only glows needs no normals.
         is_lit = max(*material.albedo, *material.mirror) > 0.0
         record.smooth, record.fresnel = int(source.smooth and is_lit), int(material.fresnel)
-        record.normals = geometry.normals if record.smooth else wp.empty(0, dtype=wp.vec3, device=self.device)
+        needs_normals = record.smooth or not self._skip_attributes
+        record.normals = geometry.normals if needs_normals else wp.empty(0, dtype=wp.vec3, device=self.device)
         record.albedo, record.emission = wp.vec3(*material.albedo), wp.vec3(*material.emission)
         record.mirror = wp.vec3(*material.mirror)
         self._look(record, source, geometry)
@@ -198,7 +212,8 @@ class DeviceScene:
                 places[id(texture)] = (count, texture.shape[1], texture.shape[0])
                 texels.append(texture.reshape(-1, 3))
                 count += len(texels[-1])
-        record.uvs = geometry.uvs if texels else wp.empty(0, dtype=wp.vec2, device=self.device)
+        needs_uvs = texels or not self._skip_attributes
+        record.uvs = geometry.uvs if needs_uvs else wp.empty(0, dtype=wp.vec2, device=self.device)
         table = [(0, 0, 0) if texture is None else places[id(texture)] for texture in textures]
         pool = np.concatenate(texels) if texels else np.zeros((0, 3), np.float32)
         record.part_first = wp.array([p.first_triangle for p in mesh.parts], dtype=wp.int32, device=self.device)

@@ -17,6 +17,7 @@ from ldtrefl.methods import find_method
 from ldtrefl.methods.base import Reflection
 from ldtrefl.reflect import FirstHits, no_shadows, shade_gbuffer
 from ldtrefl.scene import Camera, Scene, Vector
+from ldtrefl.skips import chosen
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +78,8 @@ class Renderer:
         kind = find_method(scene.reflection.method if method is None else method)
         config = kind.configured(options)
         self.scene = scene
-        self._device_scene = DeviceScene(scene, launch.resolve_device(device))
+        skips = chosen(config.skip)
+        self._device_scene = DeviceScene(scene, launch.resolve_device(device), skip_attributes=skips.attributes)
         self._method = kind(self._device_scene, config)
         self._drawing = KeptDrawing()
         self._last: _Shaded | None = None
@@ -100,7 +102,8 @@ class Renderer:
         given = {"translate": translate, "rotate": rotate, "scale": scale}
         changes = {key: value for key, value in given.items() if value is not None}
         self.scene = self.scene.with_object(name, **changes)
-        self._device_scene = DeviceScene(self.scene, self._device_scene.device, self._device_scene)
+        before, skips = self._device_scene, self._method.skips
+        self._device_scene = DeviceScene(self.scene, before.device, before, skip_attributes=skips.attributes)
         self._method.place(self._device_scene)
 
     def render(self, camera: Camera | None = None) -> Frame:
@@ -120,6 +123,7 @@ class Renderer:
         stats.count("pixels", gbuffer.pixel_count)
         stats.count("reflector_pixels", int(mask.sum()))
         stats.count("rays", 0)
+        stats.count("attribute_bytes", scene.attribute_bytes)
         with stats.stage("composite", device):
             image = wp.empty(gbuffer.pixel_count, dtype=wp.vec3, device=device)
             inputs = [shaded.direct, shaded.mirror, reflection.radiance, image]
@@ -142,6 +146,11 @@ class Renderer:
         else:
             reflection = Reflection(wp.zeros(gbuffer.pixel_count, dtype=wp.vec3, device=device))
         return _Shaded(gbuffer, direct, mirror, reflection)
+
+    @property
+    def gbuffer(self) -> GBuffer | None:
+        """What the camera saw in the last frame."""
+        return None if self._last is None else self._last.gbuffer
 
     def texel_sizes(self, resolution: int) -> np.ndarray:
         """(objects,) length in the world of a texel of each object's maps at ``resolution``."""

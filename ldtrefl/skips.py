@@ -28,8 +28,8 @@ class Skips:
     """Objects whose bounding sphere a ray misses, or enters behind what it has met: not searched; nearest first."""
     leaps: bool = True
     """Empty bricks of an object's grid: leapt over, as many at once as can be."""
-    shading: bool = True
-    """Textures, Fresnel, environment pictures, point lights that the scene does not have: not in the kernels."""
+    attributes: bool = True
+    """Normals of objects that only glow or show their facets, texture coordinates without textures: not made."""
     frames: bool = True
     """What has not changed since the last frame: G-buffer, regions and reflections are kept."""
 

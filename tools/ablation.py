@@ -1,0 +1,294 @@
+"""What each skip is worth: time with and without it, in turn, in one process; the counter that it moves; whether the
+picture is the same; and culling's figures.
+
+    python tools/ablation.py             # five minutes; writes tools/results/ablation.json and ablation.md
+    python tools/ablation.py --quick     # small pictures of a few scenes, for the shape of the output
+
+Scenes with meshes of LDTREFL_MESH_PATH are left out where they are missing. Times are medians in milliseconds; what no
+skip can change (G-buffer, composite) is left out of them, except where a whole frame is meant.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import functools
+import json
+import statistics
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import ldtrefl
+from ldtrefl import launch, skips
+from ldtrefl.files import written_whole
+from ldtrefl.reflect import mirror_rays
+from ldtrefl.render import Frame, Renderer
+from ldtrefl.scene import Camera, Material, Object, Scene
+
+ROOT = Path(__file__).parent.parent
+SHIPPED = ("teapot", "wall", "bowl_mirror", "torus_mirror", "genus3_knot", "three_genus3")
+PAPER = ("two_balls", "knotty_cup", "buddha", "two_elephants", "three_dancers", "tyra")
+MIRROR = Material(mirror=(0.9, 0.9, 0.9))
+COUNTERS = {
+    "reflection": "objects_peeled",
+    "regions": "searches",
+    "maps": "map_bytes",
+    "bounds": "searches",
+    "leaps": "steps",
+    "attributes": "attribute_bytes",
+    "frames": "rays",
+}
+"""What each skip makes less of."""
+OUTSIDE = ("gbuffer", "composite")
+"""Stages that culling, maps and searches do not change."""
+
+
+def away_from(scene: Scene) -> Scene:
+    """The same scene with the camera turned round: no reflector in view."""
+    eye, look_at = np.array(scene.camera.eye), np.array(scene.camera.look_at)
+    behind = tuple((2 * eye - look_at).tolist())
+    return scene.with_camera(dataclasses.replace(scene.camera, look_at=behind))
+
+
+def crowd(segments: tuple[int, int], count: int) -> Scene:
+    """A mirror ball of so many segments in a crowd of knots."""
+    rng = np.random.default_rng(0)
+    objects = [Object(name="ball", shape="sphere", params={"segments": list(segments)}, material=MIRROR)]
+    for i in range(count):
+        place = rng.normal(size=3)
+        place *= rng.uniform(1.5, 3.0) / np.linalg.norm(place)
+        place[1] = -abs(place[1])
+        scale, (x, y, z) = float(rng.uniform(0.1, 0.3)), place.tolist()
+        knot = {"segments": [200, 30]}
+        objects.append(Object(name=f"knot {i}", shape="torus_knot", params=knot, scale=scale, translate=(x, y, z)))
+    return Scene(camera=Camera(eye=(0, -6, 1), look_at=(0, 0, 0), fov_y=35.0), objects=tuple(objects))
+
+
+def heavy() -> Scene:
+    """A mirror ball, a knot of 500,000 triangles that stands still, and a torus to be moved."""
+    knot = {"segments": [2500, 100]}
+    return Scene(
+        camera=Camera(eye=(0, -5, 1.2), look_at=(0, 0, 0), fov_y=35.0),
+        objects=(
+            Object(name="ball", shape="sphere", material=MIRROR),
+            Object(name="knot", shape="torus_knot", params=knot, translate=(1.3, -1.3, 0.2), scale=0.8),
+            Object(name="moved", shape="torus", scale=0.15, translate=(-1.0, -1.2, 0.3)),
+        ),
+    )
+
+
+def scenes(quick: bool) -> dict[str, Scene]:
+    """Name -> scene."""
+    found: dict[str, Scene] = {}
+    for folder, names in ((ROOT / "scenes", SHIPPED), (ROOT / "scenes" / "paper", PAPER)):
+        for name in names[:1] if quick else names:
+            try:
+                found[name if folder.name == "scenes" else f"paper/{name}"] = ldtrefl.load_scene(
+                    folder / f"{name}.toml"
+                )
+            except ldtrefl.InputError as error:
+                print(f"left out: {error}", file=sys.stderr)
+    found["teapot, camera turned away"] = away_from(found["teapot"])
+    found["crowd of 50"] = crowd((64, 32) if quick else (1000, 500), 50)
+    found["heavy knot"] = heavy()
+    if quick:
+        found = {n: s.with_camera(dataclasses.replace(s.camera, width=96, height=64)) for n, s in found.items()}
+    return found
+
+
+def in_turn(jobs: dict[str, Callable[[], float]], rounds: int) -> dict[str, float]:
+    """Median of what each job says it took, in milliseconds; one round first that does not count."""
+    spent: dict[str, list[float]] = {name: [] for name in jobs}
+    for turn in range(rounds + 1):
+        for name, job in jobs.items():
+            seconds = job()
+            if turn:
+                spent[name].append(1000 * seconds)
+    return {name: statistics.median(values) for name, values in spent.items()}
+
+
+def all_but(*names: str) -> list[str]:
+    """Every skip but these."""
+    return [name for name in skips.names() if name not in names]
+
+
+def same(a: Frame, b: Frame) -> bool:
+    """Whether two frames are the same to the bit."""
+    return np.array_equal(a.image, b.image) and np.array_equal(a.reflection, b.reflection)
+
+
+def ablate(scene: Scene, skip: str, rounds: int) -> dict[str, Any]:
+    """Time and counter of a scene with a skip and without it."""
+    if skip in ("maps", "attributes"):
+        made = {"with": skips.names(), "without": all_but(skip)}
+        frames: dict[str, Frame] = {}
+
+        def first_frame(name: str) -> float:
+            start = time.perf_counter()
+            frames[name] = Renderer(scene, "ldt", skip=made[name]).render()
+            return time.perf_counter() - start
+
+        times = in_turn({name: functools.partial(first_frame, name) for name in made}, rounds)
+    else:
+        # But to measure what is kept between frames, every frame is made anew.
+        kept = () if skip == "frames" else ("frames",)
+        renderers = {
+            "with": Renderer(scene, "ldt", skip=all_but(*kept)),
+            "without": Renderer(scene, "ldt", skip=all_but(*kept, skip)),
+        }
+        firsts = {name: renderer.render() for name, renderer in renderers.items()}
+        frames = {}
+
+        def next_frame(name: str) -> float:
+            start = time.perf_counter()
+            frames[name] = renderers[name].render()
+            whole = time.perf_counter() - start
+            stages = frames[name].stats.seconds
+            return whole if skip == "frames" else whole - sum(stages.get(stage, 0.0) for stage in OUTSIDE)
+
+        times = in_turn({name: functools.partial(next_frame, name) for name in renderers}, rounds)
+        if skip == "reflection":  # maps are made in the first frame
+            for name, first in firsts.items():
+                frames[name].stats.counters["objects_peeled"] = first.stats.counters.get("objects_peeled", 0)
+    counter = COUNTERS[skip]
+    return {
+        "milliseconds": times,
+        "ratio": times["with"] / times["without"],
+        "counter": {name: frame.stats.counters.get(counter, 0) for name, frame in frames.items()},
+        "same": same(frames["with"], frames["without"]),
+    }
+
+
+def moved(scene: Scene, rounds: int) -> dict[str, Any]:
+    """The heavy scene with its torus moved before every frame."""
+    renderers = {"with": Renderer(scene, "ldt"), "without": Renderer(scene, "ldt", skip=all_but("frames"))}
+    frames: dict[str, Frame] = {}
+    step = dict.fromkeys(renderers, 0)
+
+    def next_frame(name: str) -> float:
+        step[name] += 1
+        renderers[name].move("moved", translate=(-1.0, -1.2, 0.3 + 0.01 * step[name]))
+        start = time.perf_counter()
+        frames[name] = renderers[name].render()
+        return time.perf_counter() - start
+
+    times = in_turn({name: functools.partial(next_frame, name) for name in renderers}, rounds)
+    return {
+        "milliseconds": times,
+        "ratio": times["with"] / times["without"],
+        "counter": {name: frame.stats.counters["rays"] for name, frame in frames.items()},
+        "same": same(frames["with"], frames["without"]),
+    }
+
+
+def culling(scene: Scene, rounds: int) -> dict[str, Any] | None:
+    """Rays handed to the search against rays that enter a bounding sphere; pixels lost; what culling takes."""
+    options: dict[str, dict[str, Any]] = {
+        "none": {"skip": all_but("frames", "regions", "bounds")},
+        "safe": {"skip": all_but("frames")},
+        "flat": {"skip": all_but("frames"), "cull": "flat"},
+    }
+    renderers = {name: Renderer(scene, "ldt", **given) for name, given in options.items()}
+    frames = {name: renderer.render() for name, renderer in renderers.items()}
+    if not frames["safe"].stats.counters["rays"]:
+        return None
+    truth = frames["none"]
+    lost = {name: int((frame.image != truth.image).any(axis=2).sum()) for name, frame in frames.items()}
+    share: dict[str, float] = {}
+
+    def cull(name: str) -> float:
+        seconds = renderers[name].render().stats.seconds
+        share[name] = seconds["cull"] / sum(seconds.values())
+        return seconds["cull"]
+
+    times = in_turn({name: functools.partial(cull, name) for name in ("safe", "flat")}, rounds)
+    entering = rays_that_enter(renderers["safe"])
+    return {
+        "rays": frames["safe"].stats.counters["rays"],
+        "entering": entering,
+        "handed": frames["safe"].stats.counters["searches"],
+        "lost": lost,
+        "hits": int((truth.hits.object >= 0).sum()) if truth.hits is not None else 0,
+        "milliseconds": times,
+        "share_of_frame": share["safe"],
+    }
+
+
+def rays_that_enter(renderer: Renderer) -> int:
+    """Pairs of a reflected ray of the last frame and another object's bounding sphere that it meets, in float64."""
+    assert renderer.gbuffer is not None
+    rays, count = mirror_rays(renderer.gbuffer), 0
+    origin, direction = rays.origin.numpy().astype(float), rays.direction.numpy().astype(float)
+    source = rays.source.numpy()
+    for entry in renderer.gbuffer.scene.objects:
+        offset = np.array(entry.record.centre, float) - origin
+        along = (offset * direction).sum(axis=1)
+        square, radius = (offset**2).sum(axis=1), float(entry.record.radius)
+        meets = (square <= radius**2) | ((square - along**2 <= radius**2) & (along > 0))
+        count += int((meets & (source != entry.index)).sum())
+    return count
+
+
+def table(result: dict[str, Any]) -> str:
+    """The result in Markdown."""
+    lines = ["# What each skip is worth", "", f"{result['threads']} threads; medians of {result['rounds']} rounds.", ""]
+    lines += ["| skip | scene | with, ms | without, ms | ratio | counter | with | without | same picture |"]
+    lines += ["|---|---|---|---|---|---|---|---|---|"]
+    for row in result["skips"]:
+        times, counter = row["milliseconds"], row["counter"]
+        lines.append(
+            f"| {row['skip']} | {row['scene']} | {times['with']:.2f} | {times['without']:.2f} | {row['ratio']:.2f} | "
+            f"{COUNTERS[row['skip']]} | {counter['with']} | {counter['without']} | {'yes' if row['same'] else 'NO'} |"
+        )
+    lines += ["", "## Best and worst of each", "", "| skip | best | median | worst |", "|---|---|---|---|"]
+    for skip in skips.names():
+        rows = sorted((row["ratio"], row["scene"]) for row in result["skips"] if row["skip"] == skip)
+        middle = statistics.median(ratio for ratio, _ in rows)
+        best, worst = rows[0], rows[-1]
+        lines.append(f"| {skip} | {best[0]:.2f} ({best[1]}) | {middle:.2f} | {worst[0]:.2f} ({worst[1]}) |")
+    lines += ["", "## Culling", ""]
+    lines += ["| scene | rays | enter a sphere | handed on | ratio | pixels lost: safe | flat | safe, ms | flat, ms |"]
+    lines += ["|---|---|---|---|---|---|---|---|---|"]
+    for row in result["culling"]:
+        flat = f"{row['lost']['flat']} ({100.0 * row['lost']['flat'] / max(row['hits'], 1):.2f}% of hits)"
+        times = row["milliseconds"]
+        lines.append(
+            f"| {row['scene']} | {row['rays']} | {row['entering']} | {row['handed']} | "
+            f"{row['handed'] / max(row['entering'], 1):.2f} | {row['lost']['safe']} | {flat} | "
+            f"{times['safe']:.2f} ({100.0 * row['share_of_frame']:.1f}% of the frame) | {times['flat']:.2f} |"
+        )
+    return "\n".join(lines) + "\n"
+
+
+def main() -> None:
+    """Measure, and write what was found."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="small pictures of a few scenes")
+    parser.add_argument("-o", "--output", type=Path, default=ROOT / "tools" / "results", help="folder for the results")
+    given = parser.parse_args()
+    rounds = 2 if given.quick else 11
+    result: dict[str, Any] = {"threads": launch.thread_count(), "rounds": rounds, "skips": [], "culling": []}
+    for name, scene in scenes(given.quick).items():
+        for skip in skips.names():
+            row = {"skip": skip, "scene": name, **ablate(scene, skip, rounds)}
+            result["skips"].append(row)
+            print(f"{name}: {skip} {row['ratio']:.2f} {'same' if row['same'] else 'NOT THE SAME'}", flush=True)
+        if name == "heavy knot":
+            result["skips"].append({"skip": "frames", "scene": "heavy knot, torus moved", **moved(scene, rounds)})
+        figures = culling(scene, rounds)
+        if figures is not None:
+            result["culling"].append({"scene": name, **figures})
+    given.output.mkdir(parents=True, exist_ok=True)
+    with written_whole(given.output / "ablation.json") as scratch:
+        scratch.write_text(json.dumps(result, indent=1) + "\n")
+    with written_whole(given.output / "ablation.md") as scratch:
+        scratch.write_text(table(result))
+
+
+if __name__ == "__main__":
+    main()
