@@ -239,6 +239,8 @@ def _in_words(counters: dict[str, int]) -> list[str]:
     """What was done and what was skipped, a line each."""
     n = defaultdict(int, counters)
     lines = [f"{n['reflector_pixels']} of {n['pixels']} pixels see a reflector"]
+    if n["frames_kept"]:
+        return [*lines, "nothing has changed since the last frame: it is kept"]
     if not n["reflector_pixels"]:
         return [*lines, "no reflector in view: nothing culled, peeled or traced"]
     if n["triangles_tested"]:
@@ -247,7 +249,7 @@ def _in_words(counters: dict[str, int]) -> list[str]:
             f"{n['triangles_culled']} of {n['triangles_tested']} reflector triangles out of sight or without an object "
             f"in their reflection ({share:.0f}%)"
         )
-    lines.append(f"{n['rays']} rays reflected")
+    lines.append(f"{n['rays']} rays reflected" + (f", {n['rays_kept']} kept" if n["rays_kept"] else ""))
     pairs = n["searches"] + n["searches_saved"]
     if pairs:
         share = 100.0 * n["searches_saved"] / pairs

@@ -157,6 +157,13 @@ class Doubts:
     """(cells,) uint8, 1 for those and the cells beside them."""
 
 
+def no_doubts(patches: wp.array, bricks: wp.vec3i) -> Doubts:
+    """All patches are good enough."""
+    nothing = wp.empty(0, dtype=wp.uint8, device=patches.device)
+    cells = bricks[0] * bricks[1] * bricks[2] * int(CELLS)
+    return Doubts(patches, 0.0, nothing, wp.zeros(cells, dtype=wp.uint8, device=patches.device))
+
+
 def doubts_of(
     frame: TexelFrame,
     cells_per_texel: float,

@@ -14,7 +14,7 @@ from ldtrefl import launch
 from ldtrefl.binning import bin_items, exclusive_scan
 from ldtrefl.cubemap import TexelFrame, texel_frame
 from ldtrefl.device_scene import DeviceMesh
-from ldtrefl.doubts import Doubts, doubts_of
+from ldtrefl.doubts import Doubts, doubts_of, no_doubts
 from ldtrefl.grid import BRICK, CELLS, LANES, ROWS, TRIANGLE, Grid, GridView, cell_number, number_of_cell
 from ldtrefl.patches import Piece, Survey
 
@@ -42,6 +42,10 @@ DENSE = 2.2
 """Small triangles per texel of surface from which patches stand for them: the maps are then the coarser picture."""
 FEW_TRIANGLES = 50_000
 """Triangles up to which all are kept, however fine: they fit in the cache, and a thin object stays exact."""
+FEWEST_TRIANGLES = 2_000
+"""The same in maps that are trusted: fewer take no more room than patches."""
+CELLS_PER_TEXEL = 0.3
+"""Cells in a texel of the patches, as ``GRID_CELLS`` has at the default resolution: coarser maps need no more."""
 DENSE_TRIANGLES = 300_000
 """Triangles from which a grid that keeps them all has more cells."""
 
@@ -419,18 +423,24 @@ def fill_records(
             rows_out[row + k * LANES] = 0.0
 
 
-def build_grid(geometry: DeviceMesh, resolution: int, quality: Quality) -> Grid:
+def build_grid(geometry: DeviceMesh, resolution: int, quality: Quality, *, trusted: bool = False) -> Grid:
     """The occupancy grid of a mesh; ``quality`` chooses between triangles and patches.
 
     ``exact`` keeps every triangle; the others keep them unless they are much finer than patches of ``PATCH_TEXELS`` of
-    the maps' texels, and smooth on that scale: patches then stand for them.
+    the maps' texels, and smooth on that scale: patches then stand for them. In ``trusted`` maps, whose texels are
+    smaller than what can be seen, they do so for rough surfaces and for smaller meshes, too.
     """
     triangles = len(geometry.faces)
-    if quality != "exact" and triangles > FEW_TRIANGLES:
+    if quality != "exact" and triangles > (FEWEST_TRIANGLES if trusted else FEW_TRIANGLES):
         frame = texel_frame(geometry.mesh, max(1, round(resolution / PATCH_TEXELS[quality])))
-        target, ratio = _target(geometry, frame, FAST_GRID_CELLS if quality == "fast" else GRID_CELLS)
+        cells = FAST_GRID_CELLS if quality == "fast" else GRID_CELLS
+        if trusted:
+            cells = min(cells, int(BRICK) * max(2, round(CELLS_PER_TEXEL * max(frame.size) / int(BRICK))))
+        target, ratio = _target(geometry, frame, cells)
         survey = Survey(geometry, frame, ratio, target.bricks)
         if survey.small > DENSE * survey.count * PATCH_TEXELS[quality] ** 2:
+            if trusted:
+                return _of_patches(target, survey, no_doubts(survey.patches()[0], target.bricks), geometry)
             doubts = doubts_of(frame, ratio, target.bricks, *survey.patches(), LARGEST_TURN[quality])
             if doubts.share < DOUBTFUL:
                 return _of_patches(target, survey, doubts, geometry)

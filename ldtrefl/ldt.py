@@ -59,10 +59,14 @@ class LayeredDepthTexture:
     occupancy grid over them (``grid.py``) are each made when they are first asked for.
     """
 
-    def __init__(self, geometry: DeviceMesh, frame: TexelFrame, quality: Quality = DEFAULT_QUALITY) -> None:
+    def __init__(
+        self, geometry: DeviceMesh, frame: TexelFrame, quality: Quality = DEFAULT_QUALITY, trusted: bool = False
+    ) -> None:
         self.geometry = geometry
         self.frame = frame
         self.quality: Quality = quality
+        self.trusted = trusted
+        """Whether the texels are smaller than what can be seen, so that patches need no check."""
         self.from_cache = False
         """Whether what was asked for last came from the cache in use (``cache.py``)."""
 
@@ -85,7 +89,7 @@ class LayeredDepthTexture:
         return self._kept("grid", self._make_grid, lambda entry: Grid.unpacked(entry.arrays, entry.values, *mesh))
 
     def _make_grid(self) -> Grid:
-        made = build_grid(self.geometry, self.resolution, self.quality)
+        made = build_grid(self.geometry, self.resolution, self.quality, trusted=self.trusted)
         if made.view.front != 0.0 and _shows_backs(made):
             made.view.front = 0.0
         return made
@@ -95,7 +99,7 @@ class LayeredDepthTexture:
         cache, mesh = current_cache(), self.geometry.mesh
         if cache is None or len(mesh.faces) < WORTH_KEEPING:
             return make()
-        options = {"kind": kind, "resolution": self.resolution, "quality": self.quality}
+        options = {"kind": kind, "resolution": self.resolution, "quality": self.quality, "trusted": self.trusted}
         key = key_of([mesh.vertices, mesh.faces], options)
         entry = cache.load(key)
         self.from_cache = entry is not None
@@ -335,13 +339,14 @@ def peel_mesh(
     *,
     quality: Quality = DEFAULT_QUALITY,
     search: str = DEFAULT_SEARCH,
+    trusted: bool = False,
 ) -> LayeredDepthTexture:
-    """:func:`peel` for a mesh that is on a device already."""
+    """:func:`peel` for a mesh that is on a device already; ``trusted`` if the resolution is finer than what is seen."""
     for name, adapter, value in (("resolution", _RESOLUTION, resolution), ("quality", _QUALITY, quality)):
         try:
             adapter.validate_python(value)
         except ValidationError as error:
             raise first_fault(error, {}).within(name) from None
-    maps = LayeredDepthTexture(geometry, texel_frame(geometry.mesh, resolution), quality)
+    maps = LayeredDepthTexture(geometry, texel_frame(geometry.mesh, resolution), quality, trusted)
     maps.view(search)
     return maps

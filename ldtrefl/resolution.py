@@ -11,11 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from ldtrefl.device_scene import DeviceObject
+from ldtrefl.cull import Culled
+from ldtrefl.device_scene import DeviceObject, DeviceScene
+from ldtrefl.rays import RUN
 
-TEXEL = 0.25
-"""Texels of a footprint for an error of one pixel. Where patches stand for rough surfaces a hit is off by up to five
-texels sideways at the 99th percentile (measured on the test meshes from 32 to 128 texels)."""
+TEXEL = {"exact": 0.25, "linear": 0.75}
+"""Texels in footprints for an error of one pixel, by search. Measured on the paper's scenes, sideways to the ray, at
+the 99th percentile: patches that stand for rough surfaces are off by up to five texels where a ray grazes a ridge; the
+paper's search is off by 0.2 to 1 texel at half a pixel's texels."""
 
 FINEST = 5.0
 """Percentile of an object's footprints that its maps are made for."""
@@ -27,16 +30,15 @@ SMALLEST, LARGEST = 16, 4096
 """Texels along an object's longest side."""
 
 
-def footprint(rays: Any, width: int, runs: np.ndarray, run_length: int, entry: DeviceObject) -> float | None:
+def footprint(rays: Any, width: int, runs: np.ndarray, entry: DeviceObject) -> float | None:
     """Distance between neighbouring pixels' rays at an object, device units; None if no two neighbours meet its sphere.
 
     Args:
         rays: a ``RayBuffer``.
         width: pixels in a row of the image.
         runs: (m,) numbers of the runs of rays that may meet the object.
-        run_length: rays in a run.
     """
-    numbers = (runs[:, None] * run_length + np.arange(run_length)).ravel()
+    numbers = (runs[:, None] * int(RUN) + np.arange(int(RUN))).ravel()
     pixel, source = rays.pixel.numpy(), rays.source.numpy()
     numbers = numbers[numbers < len(pixel)]
     numbers = numbers[:: max(1, len(numbers) // SAMPLES)]
@@ -58,8 +60,26 @@ def footprint(rays: Any, width: int, runs: np.ndarray, run_length: int, entry: D
     return float(np.percentile(both, FINEST)) if len(both) else None
 
 
-def resolution_for(error: float, footprint_device: float, longest_device: float) -> int:
-    """Texels along an object's longest side for an error in pixels: powers of the root of 2, so that maps serve many
-    frames."""
-    wanted = longest_device / (TEXEL * error * footprint_device)
-    return int(np.clip(round(2.0 ** (np.ceil(2.0 * np.log2(max(wanted, 1.0))) / 2.0)), SMALLEST, LARGEST))
+def resolutions_for(
+    error: float, search: str, scene: DeviceScene, width: int, rays: Any, culled: Culled
+) -> dict[int, int]:
+    """Object -> texels along its longest side for an ``error`` in pixels, of the objects that rays can meet.
+
+    Powers of the root of 2, so that maps serve many frames. Objects with one mesh get the finest of theirs.
+    """
+    bits = culled.regions.bits.numpy()
+    by_runs = len(bits) > 0 and culled.regions.rows.shape[0] == 0
+    run_count = -(-rays.pixel.shape[0] // int(RUN))
+    finest: dict[int, int] = {}
+    for index in culled.shown:
+        entry = scene.objects[index]
+        word, bit = index // 32, np.uint32(1 << index % 32)
+        runs = np.flatnonzero(bits[:, word] & bit) if by_runs else np.arange(run_count)
+        apart = footprint(rays, width, runs, entry)
+        wanted = SMALLEST
+        if apart is not None:
+            longest = entry.longest_side * scene.device_units_per_world_unit
+            texels = longest / (TEXEL[search] * error * apart)
+            wanted = int(np.clip(round(2.0 ** (np.ceil(2.0 * np.log2(max(texels, 1.0))) / 2.0)), SMALLEST, LARGEST))
+        finest[id(entry.geometry)] = max(wanted, finest.get(id(entry.geometry), SMALLEST))
+    return {index: finest[id(scene.objects[index].geometry)] for index in culled.shown}

@@ -42,6 +42,7 @@ BOTTOM_TO_TOP = (
     "rays",
     "cull",
     "kept",
+    "resolution",
     "reflect",
     "methods.base",
     "methods",

@@ -38,6 +38,7 @@ from ldtrefl.ldt import (
 from ldtrefl.march import TRACERS
 from ldtrefl.methods.base import CONFIG, CommonConfig, Method, Reflection
 from ldtrefl.reflect import BoundTracer, follow_rays
+from ldtrefl.resolution import LARGEST, SMALLEST, resolutions_for
 from ldtrefl.scene import Camera
 
 FEW_OBJECTS = 8
@@ -53,8 +54,10 @@ class Ldt(Method):
     class Config(CommonConfig):
         """Options of ``ldt``."""
 
-        resolution: Annotated[int, Field(strict=True, ge=16, le=4096)] = DEFAULT_RESOLUTION
-        """Texels along an object's longest side, 16 to 4096."""
+        resolution: Annotated[int, Field(strict=True, ge=SMALLEST, le=LARGEST)] | None = None
+        """Texels along an object's longest side, 16 to 4096; 256 if neither this nor error is given."""
+        error: Annotated[float, Field(gt=0.0, le=64.0)] | None = None
+        """Pixels that reflected points may be off by: each object's resolution is chosen for what is seen of it."""
         search: Literal["exact", "linear"] = "exact"
         """How a ray is searched for: exact (a walk through occupied cells), linear (the paper's)."""
         quality: Quality = DEFAULT_QUALITY
@@ -73,29 +76,35 @@ class Ldt(Method):
     _has_moved = False
     """Whether any object has: what culling found then tells which rays are the same."""
 
-    def _bind(self, needed: set[int], stats: Stats) -> BoundTracer:
-        """The tracer, once the maps of the objects in ``needed`` are peeled."""
+    def _bind(self, needed: set[int], stats: Stats, resolutions: dict[int, int] | None = None) -> BoundTracer:
+        """The tracer, once the maps of the objects in ``needed`` are peeled, at these resolutions or finer."""
         maps: dict[int, LayeredDepthTexture] = self.__dict__.setdefault("_maps", {})
         quality, search = self.config.quality, self.config.search
         with stats.stage("peel", self.scene.device):
             for index in sorted(needed):
                 geometry = self.scene.objects[index].geometry
-                if id(geometry) not in maps:
-                    maps[id(geometry)] = peel_mesh(geometry, self.config.resolution, quality=quality, search=search)
-                    stats.count("objects_from_cache" if maps[id(geometry)].from_cache else "objects_peeled", 1)
-                    stats.count("records", maps[id(geometry)].record_count)
-                    stats.count("map_bytes", maps[id(geometry)].nbytes)
+                usual = self.config.resolution or DEFAULT_RESOLUTION
+                resolution = resolutions.get(index, usual) if resolutions else usual
+                # Coarser than usual they are trusted; at the usual resolution the exact search's patches are checked.
+                trusted = resolution < usual
+                resolution = min(resolution, usual) if search == "exact" else resolution
+                if id(geometry) in maps and maps[id(geometry)].resolution >= resolution:
+                    continue
+                peeled = peel_mesh(geometry, resolution, quality=quality, search=search, trusted=trusted)
+                maps[id(geometry)] = peeled
+                stats.count("objects_from_cache" if peeled.from_cache else "objects_peeled", 1)
+                stats.count("records", peeled.record_count)
+                stats.count("map_bytes", peeled.nbytes)
         tracer = TRACERS[search]
         steps = {"linear_steps": self.config.linear_steps, "binary_steps": self.config.binary_steps}
         views = []
         for entry in self.scene.objects:
-            peeled = maps.get(id(entry.geometry))
-            if peeled is None:
+            if id(entry.geometry) not in maps:
                 views.append(tracer.view())
             elif search == "exact" and not self.skips.leaps:
-                views.append(peeled.grid.view_without_leaps)
+                views.append(maps[id(entry.geometry)].grid.view_without_leaps)
             else:
-                views.append(peeled.view(search, **steps))
+                views.append(maps[id(entry.geometry)].view(search, **steps))
         return BoundTracer(tracer, wp.array(views, dtype=tracer.view, device=self.scene.device))
 
     def shadow_tracer(self, stats: Stats) -> BoundTracer:
@@ -106,13 +115,21 @@ class Ldt(Method):
         """Cull, peel what is left on first need, march."""
         bounces = self.config.max_bounces or self.scene.scene.reflection.max_bounces
 
+        resolutions: dict[int, int] = {}
+
         def cull(rays: Any, bounce: int) -> Culled:
             if not self.skips.regions or (self.config.cull == "safe" and not self._culling_pays()):
-                return not_culled(self.scene)
-            return cull_rays(gbuffer, rays, bounce, self.config.cull, stats)
+                culled = not_culled(self.scene)
+            else:
+                culled = cull_rays(gbuffer, rays, bounce, self.config.cull, stats)
+            error, search = self.config.error, self.config.search
+            if error is not None and self.config.resolution is None:
+                width = gbuffer.camera.width
+                resolutions.update(resolutions_for(error, search, self.scene, width, rays, culled))
+            return culled
 
         def bind(needed: set[int]) -> BoundTracer:
-            return self._bind(needed, stats)
+            return self._bind(needed, stats, resolutions)
 
         before, moved = self._before_of(gbuffer)
         followed, hits = follow_rays(gbuffer, cull, bind, bounces, self.skips, stats, before, moved)
@@ -126,7 +143,8 @@ class Ldt(Method):
         as fast as a run of rays does."""
         can_be_needed = not_culled(self.scene).shown
         made = {entry.index for entry in self.scene.objects if id(entry.geometry) in self.__dict__.get("_maps", {})}
-        return len(self.scene.objects) > FEW_OBJECTS or self._has_moved or not can_be_needed <= made
+        tells_more = self._has_moved or self.config.error is not None
+        return len(self.scene.objects) > FEW_OBJECTS or tells_more or not can_be_needed <= made
 
     def place(self, scene: DeviceScene) -> None:
         """Go on with a scene in which some objects have moved."""

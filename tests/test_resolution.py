@@ -1,0 +1,100 @@
+"""Resolution as needed: what is chosen for an error in pixels, and what comes of it."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import ldtrefl
+from ldtrefl.reflect import mirror_rays
+from ldtrefl.render import Renderer
+from ldtrefl.scene import Camera, Material, Object, Scene
+
+
+def scene(distance: float) -> Scene:
+    """A mirror ball and a rough ball of 57,600 triangles at a distance from it."""
+    rough = ldtrefl.shapes.make("sphere", {"segments": [240, 120]})
+    place, number = np.unique(rough.vertices.round(9), axis=0, return_inverse=True)
+    rises = 1.0 + 0.002 * np.random.default_rng(5).normal(size=(len(place), 1))
+    mesh = ldtrefl.Mesh(rough.vertices * rises[number.ravel()], rough.faces)
+    return Scene(
+        camera=Camera(eye=(0, -4, 0), look_at=(0, 0, 0), width=384, height=384, fov_y=32),
+        objects=(
+            Object(name="mirror", shape="sphere", material=Material(mirror=(1, 1, 1))),
+            Object(name="rough", mesh=mesh, translate=(0.6 * distance, -0.8 * distance, 0.0)),
+        ),
+    )
+
+
+def chosen(renderer: Renderer) -> int:
+    """The resolution of the one object that is peeled."""
+    (maps,) = renderer._method.__dict__["_maps"].values()
+    return int(maps.resolution)
+
+
+def errors_in_pixels(renderer: Renderer, frame: ldtrefl.Frame, truth: ldtrefl.Frame) -> np.ndarray:
+    """How far beside a pixel's ray the points lie that it shows, in distances between neighbouring pixels' rays."""
+    assert renderer.gbuffer is not None and frame.hits is not None and truth.hits is not None
+    placed, shape = renderer.gbuffer.scene, truth.hits.object.shape
+    rays = mirror_rays(renderer.gbuffer)
+    origin, direction = (np.full((shape[0] * shape[1], 3), np.nan) for _ in range(2))
+    origin[rays.pixel.numpy()], direction[rays.pixel.numpy()] = rays.origin.numpy(), rays.direction.numpy()
+    origin, direction = origin.reshape(*shape, 3), direction.reshape(*shape, 3)
+    t = truth.hits.distance.astype(float) * placed.device_units_per_world_unit
+    away = np.abs(frame.hits.distance - truth.hits.distance) * placed.device_units_per_world_unit
+    both = (frame.hits.object >= 0) & (truth.hits.object >= 0)
+    both[:, -1] = both[-1] = False
+    y, x = np.nonzero(both)
+    gaps = []
+    for dy, dx in ((0, 1), (1, 0)):
+        o, d, far = origin[y + dy, x + dx], direction[y + dy, x + dx], t[y, x][:, None]
+        gap = o + far * d - origin[y, x] - far * direction[y, x]
+        along = (gap * direction[y, x]).sum(axis=1, keepdims=True)
+        gaps.append(np.linalg.norm(gap - along * direction[y, x], axis=1))
+    entry = placed.objects[1]
+    matrix = placed.device_from_world @ entry.world_from_unit
+    corners = entry.geometry.mesh.unit_vertices[entry.geometry.mesh.faces[truth.hits.triangle[y, x]]]
+    a, b, c = np.moveaxis(corners @ matrix[:3, :3].T, 1, 0)
+    normal = np.cross(b - a, c - a)
+    cosine = np.abs((normal * direction[y, x]).sum(axis=1)) / np.linalg.norm(normal, axis=1)
+    sideways = away[y, x] * cosine * np.sqrt(np.maximum(1 - cosine**2, 0))
+    pixels = sideways / np.sqrt(gaps[0] * gaps[1])
+    return pixels[np.isfinite(pixels)]
+
+
+def test_what_looks_small_gets_small_maps() -> None:
+    near, far = (Renderer(scene(distance), "ldt", error=2.0) for distance in (2.2, 12.0))
+    frames = [renderer.render() for renderer in (near, far)]
+    assert chosen(far) < chosen(near) / 2
+    usual = ldtrefl.render(scene(12.0), "ldt")
+    assert frames[1].stats.counters["map_bytes"] < 0.1 * usual.stats.counters["map_bytes"]
+
+
+@pytest.mark.parametrize(("search", "error"), [("exact", 1.0), ("exact", 2.0), ("linear", 0.5)])
+def test_the_error_is_kept(search: str, error: float) -> None:
+    distance = {1.0: 20.0, 2.0: 12.0, 0.5: 2.5}[error]
+    renderer, truth = (
+        Renderer(scene(distance), "ldt", error=error, search=search),
+        ldtrefl.render(scene(distance), "bvh"),
+    )
+    errors = errors_in_pixels(renderer, renderer.render(), truth)
+    p99 = float(np.percentile(errors, 99))
+    assert 0.05 * error < p99 <= 1.2 * error, f"{search}: p99 {p99:.3f} px of {error}, {chosen(renderer)} texels"
+
+
+def test_a_resolution_by_hand_wins() -> None:
+    renderer = Renderer(scene(12.0), "ldt", error=2.0, resolution=64)
+    renderer.render()
+    assert chosen(renderer) == 64
+
+
+def test_a_camera_that_comes_near_gets_finer_maps() -> None:
+    given = scene(12.0)
+    renderer = Renderer(given, "ldt", error=2.0)
+    renderer.render()
+    before = chosen(renderer)
+    renderer.render(camera=dataclasses.replace(given.camera, eye=(0.3, -1.8, 0)))
+    after = chosen(renderer)
+    assert after > before
+    renderer.render()
+    assert chosen(renderer) == after, "maps that are fine enough stay"
