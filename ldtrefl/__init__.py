@@ -5,8 +5,10 @@ The pipeline, one module a stage:
     scene file -> Scene (scene, shapes, mesh) -> arrays on the device (device_scene)
       -> G-buffer: what the camera sees (gbuffer, raster)
       -> a method (methods/): its tracer answers reflected rays (trace), whose life is written once (reflect)
-           ldt: cull (cull), peel on first need (ldt: peel -> fragments, patches -> grid; kept by cache), march (march)
+           ldt: cull (cull), as fine as needed (resolution), peel on first need (ldt: peel -> fragments, patches, doubts
+                -> grid; kept by cache), march (march)
            bvh: the ground truth (raycast)
+      -> what stays from frame to frame (kept); what may be left out (skips)
       -> shade, the same functions for all (shade) -> composite (render) -> image (image), compared (metrics)
 """
 

@@ -139,7 +139,7 @@ def compare(
         for name in names:
             renderer, frame = _timed_frame(loaded, name, device, options.get(name, {}))
             resolution = options.get(name, {}).get("resolution", TEXEL_RESOLUTION)
-            rows[name] = _errors(frame, truth, renderer.texel_sizes(resolution))
+            rows[name] = _errors(frame, truth, renderer, resolution)
             save_image(folder / f"{name}.png", frame.image)
             save_image(folder / f"{name}-difference.png", difference_image(frame.image, truth.image))
     with written_whole(folder / "compare.json") as scratch:
@@ -325,7 +325,7 @@ def _timed_frame(scene: Scene, method: str, device: str | None, options: dict[st
     return renderer, renderer.render()
 
 
-def _errors(frame: Frame, truth: Frame, texel_sizes: np.ndarray) -> dict[str, Any]:
+def _errors(frame: Frame, truth: Frame, renderer: Renderer, resolution: int) -> dict[str, Any]:
     mask = truth.reflector_mask
     row: dict[str, Any] = {
         "seconds": frame.stats.seconds,
@@ -335,17 +335,21 @@ def _errors(frame: Frame, truth: Frame, texel_sizes: np.ndarray) -> dict[str, An
         "relmse": metrics.relmse(frame.image, truth.image, mask),
     }
     if frame.hits is not None and truth.hits is not None:
-        row |= vars(metrics.hit_errors(frame.hits, truth.hits, texel_sizes, mask))
+        row |= vars(metrics.hit_errors(frame.hits, truth.hits, renderer.texel_sizes(resolution), mask))
+        assert renderer.gbuffer is not None
+        pixels = metrics.reprojection_errors(frame.hits, truth.hits, renderer.gbuffer)
+        row["pixels"] = float(np.percentile(pixels, 99)) if len(pixels) else float("nan")
     return row
 
 
 def _error_table(rows: dict[str, dict[str, Any]], title: str) -> Table:
     table = Table(title=title)
-    heads = ("method", "seconds", "stages", "SSIM", "PSNR", "FLIP", "wrong hit %", "wrong miss %", "texels p50", "p99")
+    heads = ["method", "seconds", "stages", "SSIM", "PSNR", "FLIP", "wrong hit %", "wrong miss %"]
+    heads += ["texels p50", "p99", "pixels p99"]
     for head in heads:
         table.add_column(head, justify="left" if head in ("method", "stages") else "right", overflow="fold")
     formats = {"ssim": ".4f", "psnr": ".1f", "flip": ".4f", "wrong_hits": ".3f", "wrong_misses": ".3f"}
-    formats |= {"median": ".3f", "p99": ".2f"}
+    formats |= {"median": ".3f", "p99": ".2f", "pixels": ".3f"}
     for name, row in rows.items():
         stages = " ".join(f"{stage} {seconds:.3f}" for stage, seconds in row["seconds"].items())
         figures = [format(row[key], spec) if key in row else "-" for key, spec in formats.items()]

@@ -12,6 +12,7 @@ import flip_evaluator
 import numpy as np
 from skimage.metrics import structural_similarity
 
+from ldtrefl.gbuffer import GBuffer
 from ldtrefl.image import srgb_from_linear
 from ldtrefl.reflect import FirstHits
 
@@ -97,3 +98,41 @@ def hit_errors(hits: FirstHits, truth: FirstHits, texel_sizes: np.ndarray, mask:
         float(median),
         float(p99),
     )
+
+
+def reprojection_errors(hits: FirstHits, truth: FirstHits, gbuffer: GBuffer) -> np.ndarray:
+    """(n,) how many pixels away a point is seen from where it should be, for rays that both end on an object.
+
+    A hit in front of the surface or behind it shows what lies beside the true point: sideways to the ray by the
+    distance along it times sine and cosine of its angle with the surface. Compared with the distance between
+    neighbouring pixels' rays there, the mean of the one to the right and the one below.
+    """
+    scene, shape = gbuffer.scene, truth.shape
+    pixel = truth.rays.pixel.numpy()
+    origin, direction = (np.full((*shape, 3), np.nan) for _ in range(2))
+    source = np.full(shape, -1)
+    at = np.unravel_index(pixel, shape)
+    origin[at], direction[at] = truth.rays.origin.numpy(), truth.rays.direction.numpy()
+    source[at] = truth.rays.source.numpy()
+    both = (hits.object >= 0) & (truth.object >= 0)
+    both[:, -1] = both[-1] = False
+    both[:-1, :-1] &= (source[:-1, :-1] == source[:-1, 1:]) & (source[:-1, :-1] == source[1:, :-1])
+    y, x = np.nonzero(both)  # with both neighbours on the same mirror
+    o, d = origin[y, x], direction[y, x]
+    along = truth.distance[y, x].astype(float)[:, None] * scene.device_units_per_world_unit
+    footprint = np.ones(len(y))
+    for dy, dx in ((0, 1), (1, 0)):
+        gap = origin[y + dy, x + dx] + along * direction[y + dy, x + dx] - (o + along * d)
+        gap -= (gap * d).sum(axis=1, keepdims=True) * d
+        footprint *= np.sqrt(np.linalg.norm(gap, axis=1))
+    errors = np.abs(hits.distance[y, x].astype(float) - truth.distance[y, x]) * scene.device_units_per_world_unit
+    index, triangle = truth.object[y, x], truth.triangle[y, x]
+    for entry in scene.objects:
+        here = index == entry.index
+        corners = entry.geometry.mesh.unit_vertices[entry.geometry.mesh.faces[triangle[here]]].astype(float)
+        a, b, c = np.moveaxis(corners @ (scene.device_from_world @ entry.world_from_unit)[:3, :3].T, 1, 0)
+        normal = np.cross(b - a, c - a)
+        length = np.maximum(np.linalg.norm(normal, axis=1), np.finfo(float).tiny)
+        cosine = np.clip(np.abs((normal * d[here]).sum(axis=1)) / length, 0.0, 1.0)
+        errors[here] *= cosine * np.sqrt(1.0 - cosine**2)
+    return errors[footprint > 0.0] / footprint[footprint > 0.0]

@@ -58,6 +58,8 @@ class _Shaded:
     direct: wp.array
     mirror: wp.array
     reflection: Reflection
+    stages: tuple[str, ...]
+    """What was timed."""
 
 
 class Renderer:
@@ -114,6 +116,8 @@ class Renderer:
         last = self._last if self._method.skips.frames else None
         if last is not None and last.gbuffer.camera == camera and last.gbuffer.scene is scene:
             stats.count("frames_kept", 1)
+            stats.count("rays_kept", int(last.gbuffer.reflector_mask.sum()))
+            stats.seconds.update(dict.fromkeys(last.stages, 0.0))
             shaded = last
         else:
             shaded = self._shaded(camera, stats)
@@ -145,7 +149,7 @@ class Renderer:
             reflection = method.reflect(gbuffer, stats)
         else:
             reflection = Reflection(wp.zeros(gbuffer.pixel_count, dtype=wp.vec3, device=device))
-        return _Shaded(gbuffer, direct, mirror, reflection)
+        return _Shaded(gbuffer, direct, mirror, reflection, tuple(stats.seconds))
 
     @property
     def gbuffer(self) -> GBuffer | None:

@@ -5,7 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from ldtrefl import shapes
+from ldtrefl import shapes, skips
 from ldtrefl.methods import all_methods
 
 ROOT = Path(__file__).parent.parent
@@ -42,3 +42,20 @@ def test_benchmark_writes_what_it_promises(tmp_path: Path) -> None:
     for row in result["meshes"]:
         assert row["errors"]["ldt exact"]["wrong_hits"] + row["errors"]["ldt exact"]["wrong_misses"] <= 0.01
         assert {"median", "min", "max"} <= set(row["milliseconds"]["bvh"])
+
+
+def test_ablation_writes_what_it_promises(tmp_path: Path) -> None:
+    """Its shape, and that no skip changes a picture."""
+    command = [sys.executable, str(ROOT / "tools" / "ablation.py"), "--quick", "-o", str(tmp_path)]
+    done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    result = json.loads((tmp_path / "ablation.json").read_text())
+    assert {row["skip"] for row in result["skips"]} == set(skips.names())
+    assert all(row["same"] for row in result["skips"])
+    assert all(row["lost"]["safe"] == 0 for row in result["culling"])
+    assert all(row["handed"] <= 1.5 * row["entering"] for row in result["culling"])
+
+
+def test_readme_lists_every_skip() -> None:
+    readme = (ROOT / "README.md").read_text()
+    assert all(f"| `{name}` |" in readme for name in skips.names())

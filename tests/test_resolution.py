@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import ldtrefl
-from ldtrefl.reflect import mirror_rays
+from ldtrefl.metrics import reprojection_errors
 from ldtrefl.render import Renderer
 from ldtrefl.scene import Camera, Material, Object, Scene
 
@@ -28,38 +28,8 @@ def scene(distance: float) -> Scene:
 
 def chosen(renderer: Renderer) -> int:
     """The resolution of the one object that is peeled."""
-    (maps,) = renderer._method.__dict__["_maps"].values()
+    (maps,) = vars(renderer._method)["_maps"].values()
     return int(maps.resolution)
-
-
-def errors_in_pixels(renderer: Renderer, frame: ldtrefl.Frame, truth: ldtrefl.Frame) -> np.ndarray:
-    """How far beside a pixel's ray the points lie that it shows, in distances between neighbouring pixels' rays."""
-    assert renderer.gbuffer is not None and frame.hits is not None and truth.hits is not None
-    placed, shape = renderer.gbuffer.scene, truth.hits.object.shape
-    rays = mirror_rays(renderer.gbuffer)
-    origin, direction = (np.full((shape[0] * shape[1], 3), np.nan) for _ in range(2))
-    origin[rays.pixel.numpy()], direction[rays.pixel.numpy()] = rays.origin.numpy(), rays.direction.numpy()
-    origin, direction = origin.reshape(*shape, 3), direction.reshape(*shape, 3)
-    t = truth.hits.distance.astype(float) * placed.device_units_per_world_unit
-    away = np.abs(frame.hits.distance - truth.hits.distance) * placed.device_units_per_world_unit
-    both = (frame.hits.object >= 0) & (truth.hits.object >= 0)
-    both[:, -1] = both[-1] = False
-    y, x = np.nonzero(both)
-    gaps = []
-    for dy, dx in ((0, 1), (1, 0)):
-        o, d, far = origin[y + dy, x + dx], direction[y + dy, x + dx], t[y, x][:, None]
-        gap = o + far * d - origin[y, x] - far * direction[y, x]
-        along = (gap * direction[y, x]).sum(axis=1, keepdims=True)
-        gaps.append(np.linalg.norm(gap - along * direction[y, x], axis=1))
-    entry = placed.objects[1]
-    matrix = placed.device_from_world @ entry.world_from_unit
-    corners = entry.geometry.mesh.unit_vertices[entry.geometry.mesh.faces[truth.hits.triangle[y, x]]]
-    a, b, c = np.moveaxis(corners @ matrix[:3, :3].T, 1, 0)
-    normal = np.cross(b - a, c - a)
-    cosine = np.abs((normal * direction[y, x]).sum(axis=1)) / np.linalg.norm(normal, axis=1)
-    sideways = away[y, x] * cosine * np.sqrt(np.maximum(1 - cosine**2, 0))
-    pixels = sideways / np.sqrt(gaps[0] * gaps[1])
-    return pixels[np.isfinite(pixels)]
 
 
 def test_what_looks_small_gets_small_maps() -> None:
@@ -77,8 +47,9 @@ def test_the_error_is_kept(search: str, error: float) -> None:
         Renderer(scene(distance), "ldt", error=error, search=search),
         ldtrefl.render(scene(distance), "bvh"),
     )
-    errors = errors_in_pixels(renderer, renderer.render(), truth)
-    p99 = float(np.percentile(errors, 99))
+    frame = renderer.render()
+    assert frame.hits is not None and truth.hits is not None and renderer.gbuffer is not None
+    p99 = float(np.percentile(reprojection_errors(frame.hits, truth.hits, renderer.gbuffer), 99))
     assert 0.05 * error < p99 <= 1.2 * error, f"{search}: p99 {p99:.3f} px of {error}, {chosen(renderer)} texels"
 
 

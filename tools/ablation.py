@@ -55,6 +55,26 @@ def away_from(scene: Scene) -> Scene:
     return scene.with_camera(dataclasses.replace(scene.camera, look_at=behind))
 
 
+def glowing(scene: Scene) -> Scene:
+    """The same scene with everything but the mirrors glowing."""
+    lamp = Material(albedo=(0, 0, 0), emission=(0.6, 0.5, 0.3))
+    objects = [o if o.is_reflector else dataclasses.replace(o, material=lamp) for o in scene.objects]
+    return dataclasses.replace(scene, objects=tuple(objects))
+
+
+def with_new_meshes(scene: Scene) -> Scene:
+    """The same scene, nothing known of its files' meshes but corners, triangles and texture coordinates."""
+    objects = []
+    for entry in scene.objects:
+        mesh = entry.geometry
+        if entry.mesh is not None:
+            anew = ldtrefl.Mesh(mesh.vertices, mesh.faces, uvs=mesh.uvs, parts=mesh.parts)
+            objects.append(dataclasses.replace(entry, mesh=anew))
+        else:
+            objects.append(entry)
+    return dataclasses.replace(scene, objects=tuple(objects))
+
+
 def crowd(segments: tuple[int, int], count: int) -> Scene:
     """A mirror ball of so many segments in a crowd of knots."""
     rng = np.random.default_rng(0)
@@ -94,6 +114,8 @@ def scenes(quick: bool) -> dict[str, Scene]:
             except ldtrefl.InputError as error:
                 print(f"left out: {error}", file=sys.stderr)
     found["teapot, camera turned away"] = away_from(found["teapot"])
+    if "paper/buddha" in found:
+        found["glowing buddha"] = glowing(found["paper/buddha"])
     found["crowd of 50"] = crowd((64, 32) if quick else (1000, 500), 50)
     found["heavy knot"] = heavy()
     if quick:
@@ -101,15 +123,18 @@ def scenes(quick: bool) -> dict[str, Scene]:
     return found
 
 
-def in_turn(jobs: dict[str, Callable[[], float]], rounds: int) -> dict[str, float]:
-    """Median of what each job says it took, in milliseconds; one round first that does not count."""
+def in_turn(jobs: dict[str, Callable[[], float]], rounds: int) -> tuple[dict[str, float], float]:
+    """Median of what each job says it took, in milliseconds, and the median over the rounds of the first's share of the
+    second's. Every other round goes backwards, so that neither is always the first; one round does not count."""
     spent: dict[str, list[float]] = {name: [] for name in jobs}
     for turn in range(rounds + 1):
-        for name, job in jobs.items():
+        for name, job in reversed(jobs.items()) if turn % 2 else jobs.items():
             seconds = job()
             if turn:
                 spent[name].append(1000 * seconds)
-    return {name: statistics.median(values) for name, values in spent.items()}
+    first, second = spent.values()
+    ratio = statistics.median(a / b for a, b in zip(first, second, strict=True))
+    return {name: statistics.median(values) for name, values in spent.items()}, ratio
 
 
 def all_but(*names: str) -> list[str]:
@@ -129,11 +154,12 @@ def ablate(scene: Scene, skip: str, rounds: int) -> dict[str, Any]:
         frames: dict[str, Frame] = {}
 
         def first_frame(name: str) -> float:
+            anew = with_new_meshes(scene)
             start = time.perf_counter()
-            frames[name] = Renderer(scene, "ldt", skip=made[name]).render()
+            frames[name] = Renderer(anew, "ldt", skip=made[name]).render()
             return time.perf_counter() - start
 
-        times = in_turn({name: functools.partial(first_frame, name) for name in made}, rounds)
+        times, ratio = in_turn({name: functools.partial(first_frame, name) for name in made}, rounds)
     else:
         # But to measure what is kept between frames, every frame is made anew.
         kept = () if skip == "frames" else ("frames",)
@@ -151,14 +177,14 @@ def ablate(scene: Scene, skip: str, rounds: int) -> dict[str, Any]:
             stages = frames[name].stats.seconds
             return whole if skip == "frames" else whole - sum(stages.get(stage, 0.0) for stage in OUTSIDE)
 
-        times = in_turn({name: functools.partial(next_frame, name) for name in renderers}, rounds)
+        times, ratio = in_turn({name: functools.partial(next_frame, name) for name in renderers}, rounds)
         if skip == "reflection":  # maps are made in the first frame
             for name, first in firsts.items():
                 frames[name].stats.counters["objects_peeled"] = first.stats.counters.get("objects_peeled", 0)
     counter = COUNTERS[skip]
     return {
         "milliseconds": times,
-        "ratio": times["with"] / times["without"],
+        "ratio": ratio,
         "counter": {name: frame.stats.counters.get(counter, 0) for name, frame in frames.items()},
         "same": same(frames["with"], frames["without"]),
     }
@@ -177,10 +203,10 @@ def moved(scene: Scene, rounds: int) -> dict[str, Any]:
         frames[name] = renderers[name].render()
         return time.perf_counter() - start
 
-    times = in_turn({name: functools.partial(next_frame, name) for name in renderers}, rounds)
+    times, ratio = in_turn({name: functools.partial(next_frame, name) for name in renderers}, rounds)
     return {
         "milliseconds": times,
-        "ratio": times["with"] / times["without"],
+        "ratio": ratio,
         "counter": {name: frame.stats.counters["rays"] for name, frame in frames.items()},
         "same": same(frames["with"], frames["without"]),
     }
@@ -206,7 +232,7 @@ def culling(scene: Scene, rounds: int) -> dict[str, Any] | None:
         share[name] = seconds["cull"] / sum(seconds.values())
         return seconds["cull"]
 
-    times = in_turn({name: functools.partial(cull, name) for name in ("safe", "flat")}, rounds)
+    times, _ = in_turn({name: functools.partial(cull, name) for name in ("safe", "flat")}, rounds)
     entering = rays_that_enter(renderers["safe"])
     return {
         "rays": frames["safe"].stats.counters["rays"],
@@ -271,7 +297,7 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="small pictures of a few scenes")
     parser.add_argument("-o", "--output", type=Path, default=ROOT / "tools" / "results", help="folder for the results")
     given = parser.parse_args()
-    rounds = 2 if given.quick else 11
+    rounds = 2 if given.quick else 15
     result: dict[str, Any] = {"threads": launch.thread_count(), "rounds": rounds, "skips": [], "culling": []}
     for name, scene in scenes(given.quick).items():
         for skip in skips.names():

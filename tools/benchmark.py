@@ -13,7 +13,9 @@ sphere beside the object; the truth is the BVH where Embree, in robust mode, agr
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import functools
+import itertools
 import json
 import os
 import platform
@@ -26,18 +28,20 @@ from typing import Any
 
 import matplotlib
 import numpy as np
+import trimesh
 import warp as wp
 from embreex import rtcore_scene
 from embreex.mesh_construction import TriangleMesh
 
 import ldtrefl
-from ldtrefl import launch, metrics, shapes
+from ldtrefl import launch, metrics, shapes, skips
 from ldtrefl.device_scene import DeviceMesh
 from ldtrefl.files import written_whole
 from ldtrefl.grid_build import Quality
 from ldtrefl.ldt import peel_mesh
 from ldtrefl.march import TRACERS
 from ldtrefl.raycast import BVH, Raycaster
+from ldtrefl.render import Renderer
 from ldtrefl.scene import Camera, Light, Material, Object, Scene
 from ldtrefl.trace import Tracer, batch_kernel
 
@@ -64,6 +68,9 @@ REAL = (
     "mosquito_in_amber.ply",
     "spot.glb",
 )
+SCAN = "lucy.ply, finer"
+"""A stand-in for a dense scan: lucy with every triangle in sixteen on Loop's limit surface, roughened by a third of an
+edge."""
 ERROR_TEXELS = 128
 """Distances are given in texels of a map of this resolution, whatever the map's."""
 
@@ -104,6 +111,8 @@ PAPER_TABLE_2 = {  # scene: milliseconds for reflector and reflection on the sam
     "three_dancers": (1.029, 6.261),
 }
 ROOT = Path(__file__).parent.parent
+SKIPS_BUT_FRAMES = [name for name in skips.names() if name != "frames"]
+"""So that every frame is made anew."""
 
 
 def timed_in_turn(jobs: Mapping[str, Callable[[], Any]], rounds: int) -> dict[str, dict[str, float]]:
@@ -199,10 +208,23 @@ def load(name: str) -> ldtrefl.Mesh | None:
         return shapes.make("torus_knot", {"segments": list(KNOTS[name])})
     if name in shapes.names():
         return shapes.make(name)
+    if name == SCAN:
+        coarse = load("lucy.ply")
+        return None if coarse is None else _finer(coarse)
     for folder in filter(None, os.environ.get("LDTREFL_MESH_PATH", "").split(os.pathsep)):
         if (Path(folder) / name).is_file():
             return ldtrefl.load_mesh(Path(folder) / name)
     return None
+
+
+def _finer(mesh: ldtrefl.Mesh) -> ldtrefl.Mesh:
+    fine = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+    fine.merge_vertices(merge_tex=True, merge_norm=True)
+    fine = fine.subdivide_loop(iterations=2)
+    edge = float(fine.edges_unique_length.mean())
+    return ldtrefl.Mesh(
+        fine.vertices + 0.3 * edge * np.random.default_rng(0).normal(size=fine.vertices.shape), fine.faces
+    )
 
 
 def rays_on_meshes(names: list[str], width: int, height: int, rounds: int) -> list[dict[str, Any]]:
@@ -317,7 +339,7 @@ def error_against_time(quick: bool, rounds: int) -> list[dict[str, Any]]:
     for resolution in (64, 256) if quick else (64, 128, 256, 512, 1024):
         curves.append(("envmap", f"{resolution}", scene, "envmap", {"resolution": resolution}))
     points = []
-    renderers = [ldtrefl.Renderer(where, method, **options) for _, _, where, method, options in curves]
+    renderers = [Renderer(where, method, skip=SKIPS_BUT_FRAMES, **options) for _, _, where, method, options in curves]
     jobs = {str(i): renderer.render for i, renderer in enumerate(renderers)}
     times = timed_in_turn(jobs, max(2, rounds // 2))
     for i, (curve, label, _, _, _) in enumerate(curves):
@@ -346,7 +368,7 @@ def frame_stages(quick: bool, rounds: int) -> dict[str, Any]:
             first: list[dict[str, float]] = []
             moved: list[dict[str, float]] = []
             for _ in range(rounds + 1):
-                renderer = ldtrefl.Renderer(scene, method)
+                renderer = Renderer(scene, method)
                 first.append(renderer.render().stats.seconds)
                 # A camera that moves: the maps stay, everything else is done again.
                 camera = Camera(**{**vars_of(scene.camera), "eye": (0.001 * len(first) - 0.5, -4.5, 0.8)})
@@ -376,33 +398,81 @@ def spin(first: int, out: wp.array(dtype=float)):
     out[i] = x
 
 
+def error_targets(quick: bool, rounds: int) -> list[dict[str, Any]]:
+    """What ``error`` asks for and what comes of it: pixels, bytes and milliseconds beside the usual resolution."""
+    ldtrefl.set_threads()
+    found = {}
+    for name in ("two_balls",) if quick else PAPER_TABLE_2:
+        try:
+            found[name] = ldtrefl.load_scene(ROOT / "scenes" / "paper" / f"{name}.toml")
+        except ldtrefl.InputError:
+            continue
+    if "three_dancers" in found:
+        found["three_dancers, far"] = _farther(found["three_dancers"], 2.5)
+        found["three_dancers, very far"] = _farther(found["three_dancers"], 8.0)
+    rows = []
+    for name, scene in found.items():
+        truth = ldtrefl.render(scene, "bvh")
+        for search, error in itertools.product(("exact", "linear"), (None, 0.5, 2.0)):
+            Renderer(scene, "ldt", search=search, error=error).render()  # compiles
+            renderer = Renderer(scene, "ldt", search=search, error=error, skip=SKIPS_BUT_FRAMES)
+            first = renderer.render()
+            assert first.hits is not None and truth.hits is not None and renderer.gbuffer is not None
+            pixels = metrics.reprojection_errors(first.hits, truth.hits, renderer.gbuffer)
+            marches = [1000 * renderer.render().stats.seconds["march"] for _ in range(rounds)]
+            rows.append(
+                {
+                    "scene": name,
+                    "search": search,
+                    "error": error,
+                    "pixels_p50": float(np.percentile(pixels, 50)) if len(pixels) else None,
+                    "pixels_p99": float(np.percentile(pixels, 99)) if len(pixels) else None,
+                    "bytes": first.stats.counters.get("map_bytes", 0),
+                    "peel": 1000 * first.stats.seconds["peel"],
+                    "march": statistics.median(marches),
+                }
+            )
+    return rows
+
+
+def _farther(scene: Scene, factor: float) -> Scene:
+    """The same scene with everything but the mirrors moved away from the vertical axis."""
+    objects = []
+    for entry in scene.objects:
+        x, y, z = entry.translate
+        place = (factor * x, factor * y, z)
+        objects.append(entry if entry.is_reflector else dataclasses.replace(entry, translate=place))
+    return dataclasses.replace(scene, objects=tuple(objects))
+
+
 def thread_scaling(quick: bool, rounds: int) -> dict[str, Any]:
     """Time with one thread over time with two, of peeling, of marching, and of arithmetic alone: the machine's own."""
     device = launch.resolve_device(None)
-    segments = (600, 80) if quick else (2000, 125)
-    mesh = shapes.make("torus_knot", {"segments": list(segments)})
-    geometry = DeviceMesh(ldtrefl.Mesh(mesh.unit_vertices, mesh.faces), device)
+    knots = {"10 k": KNOTS["knot 10 k"]} if quick else {"500 k": KNOTS["knot 500 k"], "2 M": KNOTS["knot 2 M"]}
+    meshes = {}
+    for size, segments in knots.items():
+        mesh = shapes.make("torus_knot", {"segments": list(segments)})
+        meshes[size] = DeviceMesh(ldtrefl.Mesh(mesh.unit_vertices, mesh.faces), device)
     o, d = mirror_rays(768, 512)
     origins, directions = (wp.array(x, dtype=wp.vec3, device=device) for x in (o, d))
-    batch = Batch(TRACERS["exact"], peel_mesh(geometry).view(), origins, directions)
-
-    def with_threads(threads: int, job: Callable[[], Any]) -> Callable[[], None]:
-        def run() -> None:
-            ldtrefl.set_threads(threads)
-            job()
-
-        return run
-
     spun = wp.empty(100_000, dtype=float, device=device)
-    jobs = {}
-    for threads in (1, 2):
-        jobs[f"arithmetic {threads}"] = with_threads(threads, lambda: launch.launch(spin, 100_000, [spun], device))
-        jobs[f"march {threads}"] = with_threads(threads, batch)
-        jobs[f"peel {threads}"] = with_threads(threads, lambda: peel_mesh(geometry))
-        jobs[f"peel linear {threads}"] = with_threads(threads, lambda: peel_mesh(geometry, search="linear"))
+    work: dict[str, Callable[[], Any]] = {"arithmetic": lambda: launch.launch(spin, 100_000, [spun], device)}
+    for size, geometry in meshes.items():
+        work[f"march {size}"] = Batch(TRACERS["exact"], peel_mesh(geometry).view(), origins, directions)
+        work[f"peel {size}"] = functools.partial(peel_mesh, geometry)
+        work[f"peel linear {size}"] = functools.partial(peel_mesh, geometry, search="linear")
+
+    def with_threads(threads: int, job: Callable[[], Any]) -> None:
+        ldtrefl.set_threads(threads)
+        job()
+
+    jobs = {
+        f"{name} {threads}": functools.partial(with_threads, threads, job)
+        for threads in (1, 2)
+        for name, job in work.items()
+    }
     times = timed_in_turn(jobs, rounds)
-    names = ("arithmetic", "march", "peel", "peel linear")
-    return {name: times[f"{name} 1"]["median"] / times[f"{name} 2"]["median"] for name in names}
+    return {name: times[f"{name} 1"]["median"] / times[f"{name} 2"]["median"] for name in work}
 
 
 def paper_tables(quick: bool, rounds: int) -> dict[str, Any]:
@@ -435,7 +505,7 @@ def paper_tables(quick: bool, rounds: int) -> dict[str, Any]:
             continue
         ours = {}
         for search in ("linear", "exact"):
-            renderer = ldtrefl.Renderer(scene, "ldt", search=search)
+            renderer = Renderer(scene, "ldt", search=search, skip=SKIPS_BUT_FRAMES)
             frames = [renderer.render().stats.seconds for _ in range(rounds + 1)][1:]
             reflecting = [frame["cull"] + frame["march"] + frame["shade"] for frame in frames]
             ours[search] = 1000 * statistics.median(reflecting)
@@ -529,6 +599,17 @@ def reading(result: dict[str, Any]) -> str:
     lines += ["", "## A frame, by stage", ""]
     for name, stages in result["stages"].items():
         lines.append(f"- {name}: " + ", ".join(f"{stage} {value:.1f}" for stage, value in stages.items()))
+    lines += ["", "## What `error` asks for and what comes of it", ""]
+    lines += [
+        "| scene | search | error, pixels | p50 | p99 | MB | peel, ms | march, ms |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for row in result["error_targets"]:
+        figures = ("-" if row[key] is None else f"{row[key]:.3f}" for key in ("pixels_p50", "pixels_p99"))
+        lines.append(
+            f"| {row['scene']} | {row['search']} | {row['error'] or 'usual 256'} | {' | '.join(figures)} | "
+            f"{row['bytes'] / 1e6:.2f} | {row['peel']:.1f} | {row['march']:.1f} |"
+        )
     scaling = ", ".join(f"{name} {value:.2f}" for name, value in result["scaling"].items())
     lines += ["", f"One thread over two: {scaling}.", "", "## The paper's tables", ""]
     lines += ["| model | paper: layers, ms (GeForce 7800) | ours | layers, ms (this CPU) |", "|---|---|---|---|"]
@@ -560,13 +641,14 @@ def main() -> None:
     arguments = parser.parse_args()
     arguments.output.mkdir(parents=True, exist_ok=True)
     quick, rounds = arguments.quick, 2 if arguments.quick else 9
-    names = ["knot 1 k", "knot 10 k"] if quick else [*KNOTS, *REAL]
+    names = ["knot 1 k", "knot 10 k"] if quick else [*KNOTS, *REAL, SCAN]
     result = {
         "machine": f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores, Warp {wp.__version__}",
         "quick": quick,
         "meshes": rays_on_meshes(names, *((192, 128) if quick else (768, 512)), rounds),
         "error_against_time": error_against_time(quick, rounds),
         "stages": frame_stages(quick, rounds),
+        "error_targets": error_targets(quick, rounds),
         "scaling": thread_scaling(quick, rounds),
         "paper": paper_tables(quick, rounds),
     }

@@ -11,7 +11,7 @@ contact shows a gap.
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import warp as wp
@@ -96,10 +96,15 @@ class EnvironmentMap(Method):
         resolution: Annotated[int, Field(strict=True, ge=1, le=4096)] = 512
         """Pixels along a side of each face, 1 to 4096."""
 
+    def __init__(self, scene: DeviceScene, config: Any) -> None:
+        super().__init__(scene, config)
+        self._cubes: dict[int, wp.array] = {}
+        """By number of the reflector."""
+
     def place(self, scene: DeviceScene) -> None:
         """Go on with a scene in which some objects have moved: every cube map may show them."""
         super().place(scene)
-        self.__dict__.pop("_cubes", None)
+        self._cubes.clear()
 
     def shadow_tracer(self, stats: Stats) -> BoundTracer:
         """A cube map has no shadow rays of its own: a BVH answers them."""
@@ -113,16 +118,15 @@ class EnvironmentMap(Method):
     def reflect(self, gbuffer: GBuffer, stats: Stats) -> Reflection:
         """Draw the cube maps on first need, then look up every reflector pixel."""
         device, n = self.scene.device, gbuffer.pixel_count
-        cubes: dict[int, wp.array] = self.__dict__.setdefault("_cubes", {})
         radiance = wp.zeros(n, dtype=wp.vec3, device=device)
         stats.count("rays", int(gbuffer.reflector_mask.sum()))
         for entry in self.scene.reflectors:
             if not (gbuffer.objects == entry.index).any():
                 continue
-            if entry.index not in cubes:
-                cubes[entry.index] = self._draw_cube(entry, stats)
+            if entry.index not in self._cubes:
+                self._cubes[entry.index] = self._draw_cube(entry, stats)
             with stats.stage("shade", device):
-                inputs = [gbuffer.view, self.scene.records, entry.index, cubes[entry.index]]
+                inputs = [gbuffer.view, self.scene.records, entry.index, self._cubes[entry.index]]
                 launch.launch(reflect_cube, n, [*inputs, self.config.resolution, radiance], device)
         return Reflection(radiance)
 

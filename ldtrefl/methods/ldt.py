@@ -71,14 +71,18 @@ class Ldt(Method):
         max_bounces: Annotated[int, Field(strict=True, ge=1, le=64)] | None = None
         """Reflections in reflections; the scene's number if not given."""
 
-    _last: tuple[Camera, DeviceScene, Followed] | None = None
-    """Of the last frame."""
-    _has_moved = False
-    """Whether any object has: what culling found then tells which rays are the same."""
+    def __init__(self, scene: DeviceScene, config: Any) -> None:
+        super().__init__(scene, config)
+        self._maps: dict[int, LayeredDepthTexture] = {}
+        """By ``id`` of the mesh on the device."""
+        self._last: tuple[Camera, DeviceScene, Followed] | None = None
+        """Of the last frame."""
+        self._has_moved = False
+        """Whether any object has: what culling found then tells which rays are the same."""
 
     def _bind(self, needed: set[int], stats: Stats, resolutions: dict[int, int] | None = None) -> BoundTracer:
         """The tracer, once the maps of the objects in ``needed`` are peeled, at these resolutions or finer."""
-        maps: dict[int, LayeredDepthTexture] = self.__dict__.setdefault("_maps", {})
+        maps = self._maps
         quality, search = self.config.quality, self.config.search
         with stats.stage("peel", self.scene.device):
             for index in sorted(needed):
@@ -135,14 +139,14 @@ class Ldt(Method):
         followed, hits = follow_rays(gbuffer, cull, bind, bounces, self.skips, stats, before, moved)
         self._last = (gbuffer.camera, self.scene, followed)
         meshes = {id(entry.geometry) for entry in self.scene.objects}
-        stats.count("objects_skipped", len(meshes) - len(self.__dict__["_maps"]))
+        stats.count("objects_skipped", len(meshes) - len(self._maps))
         return Reflection(followed.radiance, hits)
 
     def _culling_pays(self) -> bool:
         """Not where all maps that can be needed are made, and few objects stand still: each ray tests their spheres
         as fast as a run of rays does."""
         can_be_needed = not_culled(self.scene).shown
-        made = {entry.index for entry in self.scene.objects if id(entry.geometry) in self.__dict__.get("_maps", {})}
+        made = {entry.index for entry in self.scene.objects if id(entry.geometry) in self._maps}
         tells_more = self._has_moved or self.config.error is not None
         return len(self.scene.objects) > FEW_OBJECTS or tells_more or not can_be_needed <= made
 
