@@ -277,7 +277,8 @@ def _world_corners(entry: Object) -> np.ndarray:
 def _bounding_sphere(mesh: Mesh, device_from_unit: np.ndarray) -> tuple[wp.vec3, float]:
     """About the box's centre, padded for the rounding of float32 positions."""
     centre = device_from_unit[:3, 3]
-    points = mesh.unit_vertices.astype(float) @ device_from_unit[:3, :3].T
+    # Not by a matrix product: the threads of BLAS go on spinning for a frame's length and take the cores of ours.
+    points = np.einsum("ij,kj->ik", mesh.unit_vertices.astype(float), device_from_unit[:3, :3])
     used = points[mesh.is_used]
     radius = float(np.sqrt((used**2).sum(axis=1).max()))
     return wp.vec3(*centre), radius * (1.0 + 1e-5) + 1e-6 * float(np.abs(centre).max())
