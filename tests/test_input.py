@@ -146,6 +146,10 @@ def test_command_line_refuses_in_one_line(scene_file: Path) -> None:
         (("render", "scene.toml", "--method", "nope"), "unknown method 'nope'"),
         (("render", "scene.toml", "--set", "resolution=-1"), "resolution"),
         (("render", "scene.toml", "--set", "resolution"), "OPTION=VALUE"),
+        (("render", "scene.toml", "--set", "skip=regions,lepas"), "did you mean 'leaps'"),
+        (("render", "scene.toml", "--set", "skip=[1]"), "expected all, none, or names"),
+        (("render", "scene.toml", "--set", "error=0"), "error: should be greater than 0"),
+        (("render", "scene.toml", "--set", "cull=none"), "'safe' or 'flat'"),
         (("render", "scene.toml", "-o", "none/a.png"), "does not exist"),
         (("render", "scene.toml", "-o", "a.bmp"), ".png or .exr"),
         (("render", "scene.toml", "--threads", "0"), "threads"),
@@ -176,7 +180,7 @@ def test_command_line_does_its_work(scene_file: Path) -> None:
         (("peel", "genus3", "-o", "layers.png", "--resolution", "64"), "layers per face"),
         (("info", "scene.toml"), "torus"),
         (("info", "genus3"), "closed"),
-        (("methods",), "resolution = 256"),
+        (("methods",), "quality = 'balanced'  Of the exact search"),
     ]:
         done = run(*arguments, folder=folder)
         assert done.returncode == 0 and said in done.stdout, (arguments, done.stdout, done.stderr)

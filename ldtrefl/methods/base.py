@@ -9,10 +9,10 @@ from __future__ import annotations
 import abc
 import dataclasses
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import warp as wp
-from pydantic import ConfigDict, TypeAdapter, ValidationError
+from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass as pydantic_dataclass
 
 from ldtrefl.device_scene import DeviceScene
@@ -20,7 +20,7 @@ from ldtrefl.errors import InputError, first_fault, unknown_name
 from ldtrefl.gbuffer import GBuffer
 from ldtrefl.launch import Stats
 from ldtrefl.reflect import BoundTracer, FirstHits
-from ldtrefl.skips import Choice, chosen
+from ldtrefl.skips import Choice, chosen, names
 
 CONFIG = ConfigDict(extra="forbid", use_attribute_docstrings=True)
 """How every method's ``Config`` is checked."""
@@ -40,8 +40,10 @@ class Reflection:
 class CommonConfig:
     """What every method's ``Config`` begins with."""
 
-    skip: Choice = "all"
-    """What the scene does not need is left out: all of it, none, or a list of names, for measurement."""
+    # A description that classes inherit: attribute docstrings are the class's own.
+    skip: Annotated[
+        Choice, Field(description=f"What is left out: all that can be, none, or a list of {', '.join(names())}.")
+    ] = "all"
 
 
 class Method(abc.ABC):
