@@ -24,7 +24,7 @@ import warp as wp
 from ldtrefl import launch
 from ldtrefl.device_scene import DeviceScene, ObjectRecord
 from ldtrefl.gbuffer import GBuffer
-from ldtrefl.rays import RUN, RayBuffer, Regions, meets_sphere
+from ldtrefl.rays import RUN, RayBuffer, Regions, meets_sphere, objects_in, regions_of_runs, run_count, word_count
 
 CullTest = Literal["safe", "flat"]
 
@@ -235,9 +235,7 @@ class Culled:
 
 def not_culled(scene: DeviceScene) -> Culled:
     """Every ray may meet every object but its own."""
-    regions = Regions()
-    regions.bits = wp.empty((0, 0), dtype=wp.uint32, device=scene.device)
-    regions.rows = wp.empty(0, dtype=wp.int32, device=scene.device)
+    regions = regions_of_runs(wp.empty((0, 0), dtype=wp.uint32, device=scene.device))
     mirrors = {entry.index for entry in scene.reflectors}
     return Culled(regions, {entry.index for entry in scene.objects if mirrors - {entry.index}})
 
@@ -251,25 +249,23 @@ def cull_rays(gbuffer: GBuffer, rays: Any, bounce: int, test: CullTest, stats: l
     if test == "flat":
         return _flat(gbuffer, rays, stats) if bounce == 0 else not_culled(gbuffer.scene)
     scene, device = gbuffer.scene, gbuffer.scene.device
-    regions = Regions()
-    runs, words = -(-rays.source.shape[0] // int(RUN)), -(-len(scene.objects) // 32)
-    regions.bits = wp.empty((runs, words), dtype=wp.uint32, device=device)
-    regions.rows = wp.empty(0, dtype=wp.int32, device=device)
+    runs, count = run_count(rays.source.shape[0]), len(scene.objects)
+    bits = wp.empty((runs, word_count(count)), dtype=wp.uint32, device=device)
     first_rows, total = scene.reflector_rows
     kept = wp.zeros(total if bounce == 0 else 0, dtype=wp.uint8, device=device)
-    inputs = [rays, scene.records, gbuffer.view.triangle, first_rows, regions.bits, kept]
+    inputs = [rays, scene.records, gbuffer.view.triangle, first_rows, bits, kept]
     launch.launch(cull_runs, runs, inputs, device)
     if bounce == 0:
         stats.count("triangles_tested", total)
         stats.count("triangles_culled", total - int(np.count_nonzero(kept.numpy())))
-    return Culled(regions, _objects_in(regions.bits.numpy(), len(scene.objects)))
+    return Culled(regions_of_runs(bits), objects_in(bits.numpy(), count))
 
 
 def _flat(gbuffer: GBuffer, rays: Any, stats: launch.Stats) -> Culled:
     scene, device, count = gbuffer.scene, gbuffer.scene.device, len(gbuffer.scene.objects)
     first_rows, total = scene.reflector_rows
     regions = Regions()
-    regions.bits = wp.zeros((total, -(-count // 32)), dtype=wp.uint32, device=device)
+    regions.bits = wp.zeros((total, word_count(count)), dtype=wp.uint32, device=device)
     for entry, first_row in zip(scene.objects, first_rows.numpy().tolist(), strict=True):
         if entry.source.is_reflector:
             inputs = [scene.records, entry.index, first_row, gbuffer.view.camera.eye, regions.bits]
@@ -280,10 +276,4 @@ def _flat(gbuffer: GBuffer, rays: Any, stats: launch.Stats) -> Culled:
     table = regions.bits.numpy()
     stats.count("triangles_tested", total)
     stats.count("triangles_culled", int((~table.any(axis=1)).sum()))
-    return Culled(regions, _objects_in(table[regions.rows.numpy()], count))
-
-
-def _objects_in(table: np.ndarray, count: int) -> set[int]:
-    """Objects whose bit is set in any row."""
-    union = np.bitwise_or.reduce(table, axis=0)
-    return {k for k in range(count) if union[k // 32] >> np.uint32(k % 32) & np.uint32(1)}
+    return Culled(regions, objects_in(table[regions.rows.numpy()], count))

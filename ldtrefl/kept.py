@@ -14,7 +14,7 @@ import numpy as np
 import warp as wp
 
 from ldtrefl.launch import kernel, launch
-from ldtrefl.rays import RUN, HitBuffer, RayBuffer, Regions
+from ldtrefl.rays import RUN, HitBuffer, RayBuffer, bits_of, rays_of, regions_of_runs
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,32 +105,25 @@ def put_hits(
 def changed_runs(before: Followed, rays: Any, regions: Any, moved: Set[int]) -> np.ndarray | None:
     """(m,) numbers of the runs that must be followed again; None if nothing is known: other pixels see reflectors, or
     the rays were not culled by runs."""
-    words = regions.bits.shape[1]
-    if words == 0 or regions.rows.shape[0] or regions.bits.shape != before.regions.bits.shape:
+    if regions.bits.shape[1] == 0 or regions.rows.shape[0] or regions.bits.shape != before.regions.bits.shape:
         return None
     if not np.array_equal(rays.pixel.numpy(), before.rays.pixel.numpy()):
         return None
     device, runs = rays.pixel.device, regions.bits.shape[0]
-    bits = np.zeros(words, np.uint32)
-    for k in moved:
-        bits[k // 32] |= np.uint32(1 << k % 32)
+    moved_bits = wp.array(bits_of(moved, 32 * regions.bits.shape[1]), dtype=wp.uint32, device=device)
     flags = wp.empty(runs, dtype=wp.uint8, device=device)
-    inputs = [rays, before.rays, regions.bits, before.regions.bits, wp.array(bits, dtype=wp.uint32, device=device)]
-    launch(find_changed_runs, runs, [*inputs, flags], device)
+    inputs = [rays, before.rays, regions.bits, before.regions.bits, moved_bits, flags]
+    launch(find_changed_runs, runs, inputs, device)
     return np.flatnonzero(flags.numpy())
 
 
 def rays_of_runs(followed: Followed, runs: np.ndarray) -> tuple[wp.array, Any, Any]:
     """(numbers of the rays of some runs, those rays, their regions); their pixels are made black."""
-    device, total = followed.rays.pixel.device, followed.rays.pixel.shape[0]
-    numbers = (runs[:, None] * int(RUN) + np.arange(int(RUN))).ravel()
-    chosen = wp.array(numbers[numbers < total].astype(np.int32), dtype=wp.int32, device=device)
-    n = chosen.shape[0]
+    device, numbers = followed.rays.pixel.device, rays_of(runs, followed.rays.pixel.shape[0])
+    chosen, n = wp.array(numbers.astype(np.int32), dtype=wp.int32, device=device), len(numbers)
     part = RayBuffer()
     part.pixel, part.source = (wp.empty(n, dtype=wp.int32, device=device) for _ in range(2))
     part.origin, part.direction, part.weight = (wp.empty(n, dtype=wp.vec3, device=device) for _ in range(3))
     launch(take_rays, n, [chosen, followed.rays, part, followed.radiance], device)
-    regions = Regions()
-    regions.bits = wp.array(followed.regions.bits.numpy()[runs], dtype=wp.uint32, device=device)
-    regions.rows = wp.empty(0, dtype=wp.int32, device=device)
-    return chosen, part, regions
+    bits = wp.array(followed.regions.bits.numpy()[runs], dtype=wp.uint32, device=device)
+    return chosen, part, regions_of_runs(bits)

@@ -14,6 +14,7 @@ from skimage.metrics import structural_similarity
 
 from ldtrefl.gbuffer import GBuffer
 from ldtrefl.image import srgb_from_linear
+from ldtrefl.rays import distance_across
 from ldtrefl.reflect import FirstHits
 
 SSIM_WINDOW = 11
@@ -119,12 +120,11 @@ def reprojection_errors(hits: FirstHits, truth: FirstHits, gbuffer: GBuffer) -> 
     both[:-1, :-1] &= (source[:-1, :-1] == source[:-1, 1:]) & (source[:-1, :-1] == source[1:, :-1])
     y, x = np.nonzero(both)  # with both neighbours on the same mirror
     o, d = origin[y, x], direction[y, x]
-    along = truth.distance[y, x].astype(float)[:, None] * scene.device_units_per_world_unit
+    t = truth.distance[y, x].astype(float) * scene.device_units_per_world_unit
     footprint = np.ones(len(y))
     for dy, dx in ((0, 1), (1, 0)):
-        gap = origin[y + dy, x + dx] + along * direction[y + dy, x + dx] - (o + along * d)
-        gap -= (gap * d).sum(axis=1, keepdims=True) * d
-        footprint *= np.sqrt(np.linalg.norm(gap, axis=1))
+        beside = origin[y + dy, x + dx], direction[y + dy, x + dx]
+        footprint *= np.sqrt(distance_across(o, d, *beside, t))
     errors = np.abs(hits.distance[y, x].astype(float) - truth.distance[y, x]) * scene.device_units_per_world_unit
     index, triangle = truth.object[y, x], truth.triangle[y, x]
     for entry in scene.objects:

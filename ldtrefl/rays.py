@@ -5,6 +5,10 @@ Device space; directions have unit length.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
 import warp as wp
 
 from ldtrefl.device_scene import ObjectRecord
@@ -94,3 +98,50 @@ def object_bits(regions: Regions, objects: wp.array(dtype=ObjectRecord), i: int,
     if rest >= 32:
         return ~wp.uint32(0)
     return (wp.uint32(1) << wp.uint32(rest)) - wp.uint32(1)
+
+
+def word_count(objects: int) -> int:
+    """Words of a row of bits."""
+    return -(-objects // 32)
+
+
+def bits_of(numbers: Iterable[int], objects: int) -> np.ndarray:
+    """(words,) uint32: a row in which the bits of these objects are set."""
+    row = np.zeros(word_count(objects), np.uint32)
+    for k in numbers:
+        row[k // 32] |= np.uint32(1 << k % 32)
+    return row
+
+
+def objects_in(table: np.ndarray, objects: int) -> set[int]:
+    """Objects whose bit is set in any row of an (n, words) uint32 table."""
+    union = np.bitwise_or.reduce(table, axis=0)
+    return {k for k in range(objects) if union[k // 32] >> np.uint32(k % 32) & np.uint32(1)}
+
+
+def regions_of_runs(bits: wp.array) -> Any:
+    """``Regions`` with a row a run; with no rows, of rays that can meet all objects."""
+    regions = Regions()
+    regions.bits = bits
+    regions.rows = wp.empty(0, dtype=wp.int32, device=bits.device)
+    return regions
+
+
+def run_count(rays: int) -> int:
+    """Runs that hold so many rays."""
+    return -(-rays // int(RUN))
+
+
+def rays_of(runs: np.ndarray, rays: int) -> np.ndarray:
+    """Numbers of the rays in these runs, of so many rays in all."""
+    numbers = (runs[:, None] * int(RUN) + np.arange(int(RUN))).ravel()
+    return numbers[numbers < rays]
+
+
+def distance_across(
+    origin: np.ndarray, direction: np.ndarray, other_origin: np.ndarray, other_direction: np.ndarray, t: np.ndarray
+) -> np.ndarray:
+    """(n,) how far apart pairs of rays are at ``t``, (n,), across the first's direction; vectors are (n, 3)."""
+    gap = other_origin - origin + t[:, None] * (other_direction - direction)
+    gap -= (gap * direction).sum(axis=1, keepdims=True) * direction
+    return np.linalg.norm(gap, axis=1)

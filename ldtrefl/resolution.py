@@ -13,7 +13,7 @@ import numpy as np
 
 from ldtrefl.cull import Culled
 from ldtrefl.device_scene import DeviceObject, DeviceScene
-from ldtrefl.rays import RUN
+from ldtrefl.rays import bits_of, distance_across, rays_of, run_count
 
 TEXEL = {"exact": 0.25, "linear": 0.75}
 """Texels in footprints for an error of one pixel, by search. Measured on the paper's scenes, sideways to the ray, at
@@ -38,9 +38,8 @@ def footprint(rays: Any, width: int, runs: np.ndarray, entry: DeviceObject) -> f
         width: pixels in a row of the image.
         runs: (m,) numbers of the runs of rays that may meet the object.
     """
-    numbers = (runs[:, None] * int(RUN) + np.arange(int(RUN))).ravel()
     pixel, source = rays.pixel.numpy(), rays.source.numpy()
-    numbers = numbers[numbers < len(pixel)]
+    numbers = rays_of(runs, len(pixel))
     numbers = numbers[:: max(1, len(numbers) // SAMPLES)]
     origin, direction = rays.origin.numpy(), rays.direction.numpy()
     o, d = origin[numbers].astype(float), direction[numbers].astype(float)
@@ -52,9 +51,7 @@ def footprint(rays: Any, width: int, runs: np.ndarray, entry: DeviceObject) -> f
     for row, (step, to_pixel) in zip(apart, ((1, 1), (8, width)), strict=True):
         beside = np.minimum(numbers + step, len(pixel) - 1)
         pair = meets & (pixel[beside] == pixel[numbers] + to_pixel) & (source[beside] == source[numbers])
-        gap = origin[beside] + along[:, None] * direction[beside] - (o + along[:, None] * d)
-        gap -= (gap * d).sum(axis=1, keepdims=True) * d
-        row[pair] = np.linalg.norm(gap[pair], axis=1)
+        row[pair] = distance_across(o, d, origin[beside], direction[beside], along)[pair]
     both = np.sqrt(apart[0] * apart[1])
     both = both[np.isfinite(both) & (both > 0.0)]
     return float(np.percentile(both, FINEST)) if len(both) else None
@@ -69,12 +66,12 @@ def resolutions_for(
     """
     bits = culled.regions.bits.numpy()
     by_runs = len(bits) > 0 and culled.regions.rows.shape[0] == 0
-    run_count = -(-rays.pixel.shape[0] // int(RUN))
+    every_run = np.arange(run_count(rays.pixel.shape[0]))
     finest: dict[int, int] = {}
     for index in culled.shown:
         entry = scene.objects[index]
-        word, bit = index // 32, np.uint32(1 << index % 32)
-        runs = np.flatnonzero(bits[:, word] & bit) if by_runs else np.arange(run_count)
+        shows = (bits & bits_of([index], len(scene.objects))).any(axis=1) if by_runs else None
+        runs = every_run if shows is None else np.flatnonzero(shows)
         apart = footprint(rays, width, runs, entry)
         wanted = SMALLEST
         if apart is not None:
