@@ -137,7 +137,7 @@ class DeviceScene:
         self.lighting = self._lighting(before)
         self.look_from(scene.camera)
 
-    @property
+    @functools.cached_property
     def attribute_bytes(self) -> int:
         """Bytes of the normals and texture coordinates on the device."""
         meshes = {id(entry.geometry): entry.geometry for entry in self.objects}.values()

@@ -456,33 +456,3 @@ def draw_gbuffer(scene: DeviceScene, camera: Camera, *, without: int = -1) -> GB
     drawing = Drawing.empty(scene, camera)
     drawing.add(scene, camera, [number for number in range(len(scene.objects)) if number != without])
     return drawing.resolved(scene, camera)
-
-
-class KeptDrawing:
-    """G-buffers of frame after frame: while the camera stays, what stands still is drawn once."""
-
-    def __init__(self) -> None:
-        self._last: tuple[DeviceScene, Camera] | None = None
-        self._still: Drawing | None = None
-        self._moving: set[int] = set()
-        """What is not in it."""
-
-    def gbuffer(self, scene: DeviceScene, camera: Camera) -> GBuffer:
-        """What ``camera`` sees of a scene that comes from the last one."""
-        everything = set(range(len(scene.objects)))
-        moved = everything
-        if self._last is not None and self._last[1] == camera:
-            before = self._last[0].objects
-            # Pixels do not depend on device space: only what was placed anew has moved.
-            moved = {now.index for now in scene.objects if now.source is not before[now.index].source}
-        self._last = scene, camera
-        if moved == everything:
-            self._still = None
-            return draw_gbuffer(scene, camera)
-        if self._still is None or not moved <= self._moving:
-            self._moving = moved
-            self._still = Drawing.empty(scene, camera)
-            self._still.add(scene, camera, sorted(everything - moved))
-        drawing = self._still.over()
-        drawing.add(scene, camera, sorted(self._moving))
-        return drawing.resolved(scene, camera)

@@ -1,7 +1,8 @@
-"""What stays of the reflections when objects have moved and the camera has not.
+"""What stays from frame to frame when objects have moved and the camera has not.
 
-A ray that is the same as in the last frame, and could not meet a moved object then and cannot now, ends where it ended.
-So runs of rays (``rays.py``) are compared, and only those that have changed are followed again.
+Of what the camera sees: what stands still is drawn once, what moves is drawn over it. Of the reflections: a ray that is
+the same as in the last frame, and could not meet a moved object then and cannot now, ends where it ended. So runs of
+rays (``rays.py``) are compared, and only those that have changed are followed again.
 """
 
 from __future__ import annotations
@@ -13,8 +14,41 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from ldtrefl.device_scene import DeviceScene
+from ldtrefl.gbuffer import Drawing, GBuffer, draw_gbuffer
 from ldtrefl.launch import kernel, launch
 from ldtrefl.rays import RUN, HitBuffer, RayBuffer, bits_of, rays_of, regions_of_runs
+from ldtrefl.scene import Camera
+
+
+class KeptDrawing:
+    """G-buffers of frame after frame: while the camera stays, what stands still is drawn once."""
+
+    def __init__(self) -> None:
+        self._last: tuple[DeviceScene, Camera] | None = None
+        self._still: Drawing | None = None
+        self._moving: set[int] = set()
+        """What is not in it."""
+
+    def gbuffer(self, scene: DeviceScene, camera: Camera) -> GBuffer:
+        """What ``camera`` sees of a scene that comes from the last one."""
+        everything = set(range(len(scene.objects)))
+        moved = everything
+        if self._last is not None and self._last[1] == camera:
+            before = self._last[0].objects
+            # Pixels do not depend on device space: only what was placed anew has moved.
+            moved = {now.index for now in scene.objects if now.source is not before[now.index].source}
+        self._last = scene, camera
+        if moved == everything:
+            self._still = None
+            return draw_gbuffer(scene, camera)
+        if self._still is None or not moved <= self._moving:
+            self._moving = moved
+            self._still = Drawing.empty(scene, camera)
+            self._still.add(scene, camera, sorted(everything - moved))
+        drawing = self._still.over()
+        drawing.add(scene, camera, sorted(self._moving))
+        return drawing.resolved(scene, camera)
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,8 @@ import warp as wp
 
 from ldtrefl import launch
 from ldtrefl.device_scene import DeviceScene
-from ldtrefl.gbuffer import GBuffer, KeptDrawing, draw_gbuffer
+from ldtrefl.gbuffer import GBuffer, draw_gbuffer
+from ldtrefl.kept import KeptDrawing
 from ldtrefl.launch import Stats
 from ldtrefl.methods import find_method
 from ldtrefl.methods.base import Reflection
@@ -114,18 +115,18 @@ class Renderer:
         scene, device, stats = self._device_scene, self._device_scene.device, Stats()
         scene.look_from(camera)
         last = self._last if self._method.skips.frames else None
-        if last is not None and last.gbuffer.camera == camera and last.gbuffer.scene is scene:
-            stats.count("frames_kept", 1)
-            stats.count("rays_kept", int(last.gbuffer.reflector_mask.sum()))
-            stats.seconds.update(dict.fromkeys(last.stages, 0.0))
-            shaded = last
-        else:
-            shaded = self._shaded(camera, stats)
+        is_kept = last is not None and last.gbuffer.camera == camera and last.gbuffer.scene is scene
+        shaded = last if is_kept and last is not None else self._shaded(camera, stats)
         self._last = shaded
         gbuffer, reflection = shaded.gbuffer, shaded.reflection
         mask = gbuffer.reflector_mask
+        reflector_pixels = int(np.count_nonzero(mask))
+        if is_kept:
+            stats.count("frames_kept", 1)
+            stats.count("rays_kept", reflector_pixels)
+            stats.seconds.update(dict.fromkeys(shaded.stages, 0.0))
         stats.count("pixels", gbuffer.pixel_count)
-        stats.count("reflector_pixels", int(mask.sum()))
+        stats.count("reflector_pixels", reflector_pixels)
         stats.count("rays", 0)
         stats.count("attribute_bytes", scene.attribute_bytes)
         with stats.stage("composite", device):
