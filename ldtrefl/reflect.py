@@ -83,12 +83,64 @@ def no_shadows(device: wp.Device) -> BoundTracer:
 # Kernels built from a tracer.
 
 
+@wp.struct
+class Nearest:
+    """What a ray has met so far."""
+
+    t: float  # device units, +inf if nothing
+    object: int
+    triangle: int
+    barycentrics: wp.vec2
+
+
+@wp.func
+def without(bits: wp.uint32, k: int) -> wp.uint32:
+    """The bits without that of object ``k``."""
+    return bits & ~(wp.uint32(1) << wp.uint32(k % 32))
+
+
+@wp.func
+def next_entered(
+    objects: wp.array(dtype=ObjectRecord), bits: wp.uint32, word: int, origin: wp.vec3, direction: wp.vec3, t_max: float
+) -> int:
+    """Of the objects of a word of bits, the one whose bounding sphere a ray enters first; -1 if it enters none before
+    ``t_max``."""
+    if bits == wp.uint32(0):
+        return -1
+    k = 32 * word + lowest_bit(bits)
+    if without(bits, k) == wp.uint32(0) and t_max == wp.inf:
+        # One alone, which most rays have, needs no root.
+        return wp.where(meets_sphere(origin, direction, objects[k].centre, objects[k].radius), k, -1)
+    first = int(-1)
+    nearest = float(t_max)
+    rest = wp.uint32(bits)
+    while rest != wp.uint32(0):
+        j = 32 * word + lowest_bit(rest)
+        entry = sphere_entry(origin, direction, objects[j].centre, objects[j].radius)
+        if entry >= 0.0 and (entry < nearest or (entry == nearest and first < 0)):
+            nearest = entry
+            first = j
+        rest = without(rest, j)
+    return first
+
+
+@wp.func
+def next_in_turn(
+    objects: wp.array(dtype=ObjectRecord), bits: wp.uint32, word: int, origin: wp.vec3, direction: wp.vec3, t_max: float
+) -> int:
+    """The first object of a word of bits, wherever it is; -1 if there is none."""
+    if bits == wp.uint32(0):
+        return -1
+    return 32 * word + lowest_bit(bits)
+
+
 @functools.cache
 def closest_hits_kernel(tracer: Tracer, bounds: bool = True) -> wp.Kernel:
     """The kernel that finds where rays end. With ``bounds`` an object is searched for only if the ray enters its
     bounding sphere before it has met another; of 32 the first to be entered comes first."""
     closest_hit = tracer.closest_hit
-    in_bounds_only = wp.constant(1 if bounds else 0)
+    next_object = next_entered if bounds else next_in_turn
+    to_infinity = wp.constant(not bounds)
 
     @launch.kernel
     def closest_hits(
@@ -102,78 +154,41 @@ def closest_hits_kernel(tracer: Tracer, bounds: bool = True) -> wp.Kernel:
         hits: HitBuffer,
     ):
         i = first + wp.tid()
-        source = rays.source[i]
-        best = float(wp.inf)
-        best_object = int(-1)
-        best_triangle = int(-1)
-        best_barycentrics = wp.vec2(0.0, 0.0)
+        source, origin, direction = rays.source[i], rays.origin[i], rays.direction[i]
+        nearest = Nearest()
+        nearest.t = float(wp.inf)
+        nearest.object = -1
+        nearest.triangle = -1
         steps = int(0)
         searches = int(0)
-        words = int(0)
-        if source >= 0:
-            words = (objects.shape[0] + 31) / 32
-        origin = rays.origin[i]
-        direction = rays.direction[i]
+        words = wp.where(source >= 0, (objects.shape[0] + 31) / 32, 0)
         for word in range(words):
             left = object_bits(regions, objects, i, word)
             if source / 32 == word:
-                left = left & ~(wp.uint32(1) << wp.uint32(source % 32))
-
-            # Drop the spheres that the ray misses; begin with the one that it enters first.
-            k = int(-1)
-            if in_bounds_only == 0 or (left & (left - wp.uint32(1))) == wp.uint32(0):
-                if left != wp.uint32(0):
-                    k = 32 * word + lowest_bit(left)
-                    if in_bounds_only != 0:
-                        if not meets_sphere(origin, direction, objects[k].centre, objects[k].radius):
-                            k = int(-1)
-            else:
-                nearest = float(wp.inf)
-                rest = wp.uint32(left)
-                while rest != wp.uint32(0):
-                    j = 32 * word + lowest_bit(rest)
-                    entry = sphere_entry(origin, direction, objects[j].centre, objects[j].radius)
-                    if entry < 0.0 or entry > best:
-                        left = left & ~(wp.uint32(1) << wp.uint32(j % 32))
-                    elif entry < nearest:
-                        nearest = entry
-                        k = j
-                    rest = rest & (rest - wp.uint32(1))
-
+                left = without(left, source)
+            k = next_object(objects, left, word, origin, direction, nearest.t)
             while k >= 0:
-                left = left & ~(wp.uint32(1) << wp.uint32(k % 32))
                 # t stays in device units: divide by the direction's length in unit space.
                 way = wp.transform_vector(objects[k].unit_from_device, direction)
                 stretch = wp.length(way)
                 start = wp.transform_point(objects[k].unit_from_device, origin)
-                t_max = float(wp.inf)
-                if in_bounds_only != 0:
-                    t_max = BEYOND * best * stretch
+                t_max = wp.where(to_infinity, wp.inf, BEYOND * nearest.t * stretch)
                 hit = closest_hit(views, k, start, way / stretch, t_max)
                 steps += hit.steps
                 searches += 1
-                if hit.triangle >= 0:
-                    t = hit.t / stretch
-                    # Of two in one place the first counts, in whatever order they are met.
-                    if t < best or (t == best and k < best_object):
-                        best = t
-                        best_object = k
-                        best_triangle = hit.triangle
-                        best_barycentrics = wp.vec2(hit.u, hit.v)
-
-                # The next that begins before what is met.
-                k = int(-1)
-                while k < 0 and left != wp.uint32(0):
-                    j = 32 * word + lowest_bit(left)
-                    k = j
-                    if in_bounds_only != 0:
-                        if sphere_entry(origin, direction, objects[j].centre, objects[j].radius) > best:
-                            k = int(-1)
-                            left = left & (left - wp.uint32(1))
-        hits.t[i] = best
-        hits.object[i] = best_object
-        hits.triangle[i] = best_triangle
-        hits.barycentrics[i] = best_barycentrics
+                t = hit.t / stretch
+                # Of two in one place the first counts, in whatever order they are met.
+                if hit.triangle >= 0 and (t < nearest.t or (t == nearest.t and k < nearest.object)):
+                    nearest.t = t
+                    nearest.object = k
+                    nearest.triangle = hit.triangle
+                    nearest.barycentrics = wp.vec2(hit.u, hit.v)
+                left = without(left, k)
+                k = next_object(objects, left, word, origin, direction, nearest.t)
+        hits.t[i] = nearest.t
+        hits.object[i] = nearest.object
+        hits.triangle[i] = nearest.triangle
+        hits.barycentrics[i] = nearest.barycentrics
         hits.steps[i] = steps
         hits.searches[i] = searches
 
