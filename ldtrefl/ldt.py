@@ -21,7 +21,8 @@ from ldtrefl.files import written_whole
 from ldtrefl.fragments import LdtView
 from ldtrefl.grid import Grid
 from ldtrefl.grid_build import Quality, build_grid
-from ldtrefl.march import GRAZING, TRACERS
+from ldtrefl.march import TRACERS
+from ldtrefl.march_exact import GRAZING
 from ldtrefl.mesh import Mesh
 from ldtrefl.peel import Maps, Rasteriser, sort_fragments, sorted_maps
 from ldtrefl.trace import Hits, trace_batch, trace_rays

@@ -111,6 +111,21 @@ def plane_coordinates(a: wp.vec3, b: wp.vec3, c: wp.vec3, p: wp.vec3) -> wp.vec3
 
 
 @wp.func
+def brought_inside(u: float, v: float) -> wp.vec2:
+    """Barycentrics of the triangle's point next to one that lies outside by rounding."""
+    u_inside, v_inside = wp.clamp(u, 0.0, 1.0), wp.clamp(v, 0.0, 1.0)
+    excess = wp.max(u_inside + v_inside, 1.0)
+    return wp.vec2(u_inside / excess, v_inside / excess)
+
+
+@wp.func
+def barycentrics_at(a: wp.vec3, b: wp.vec3, c: wp.vec3, p: wp.vec3) -> wp.vec2:
+    """Weights of b and c at the point of the triangle's plane next to ``p``, brought into the triangle."""
+    at = plane_coordinates(a, b, c, p)
+    return brought_inside(at[0], at[1])
+
+
+@wp.func
 def extended_coordinates(record: ObjectRecord, triangle: int, point: wp.vec3) -> wp.vec2:
     """Barycentrics of a point about a triangle that stands for its neighbours, too: outside it they go on linearly.
 

@@ -34,6 +34,8 @@ BOTTOM_TO_TOP = (
     "doubts",
     "grid_build",
     "trace",
+    "march_linear",
+    "march_exact",
     "march",
     "ldt",
     "layers",
