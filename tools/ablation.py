@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from timing import in_turn
 
 import ldtrefl
 from ldtrefl import launch, skips
@@ -123,15 +124,10 @@ def scenes(quick: bool) -> dict[str, Scene]:
     return found
 
 
-def in_turn(jobs: dict[str, Callable[[], float]], rounds: int) -> tuple[dict[str, float], float]:
-    """Median of what each job says it took, in milliseconds, and the median over the rounds of the first's share of the
-    second's. Every other round goes backwards, so that neither is always the first; one round does not count."""
-    spent: dict[str, list[float]] = {name: [] for name in jobs}
-    for turn in range(rounds + 1):
-        for name, job in reversed(jobs.items()) if turn % 2 else jobs.items():
-            seconds = job()
-            if turn:
-                spent[name].append(1000 * seconds)
+def compared(jobs: dict[str, Callable[[], float]], rounds: int) -> tuple[dict[str, float], float]:
+    """Median of what each of two jobs says it took, in milliseconds, and the median over the rounds of the share that
+    the first has of the second's."""
+    spent = in_turn(jobs, rounds)
     first, second = spent.values()
     ratio = statistics.median(a / b for a, b in zip(first, second, strict=True))
     return {name: statistics.median(values) for name, values in spent.items()}, ratio
@@ -159,7 +155,7 @@ def ablate(scene: Scene, skip: str, rounds: int) -> dict[str, Any]:
             frames[name] = Renderer(anew, "ldt", skip=made[name]).render()
             return time.perf_counter() - start
 
-        times, ratio = in_turn({name: functools.partial(first_frame, name) for name in made}, rounds)
+        times, ratio = compared({name: functools.partial(first_frame, name) for name in made}, rounds)
     else:
         # But to measure what is kept between frames, every frame is made anew.
         kept = () if skip == "frames" else ("frames",)
@@ -177,7 +173,7 @@ def ablate(scene: Scene, skip: str, rounds: int) -> dict[str, Any]:
             stages = frames[name].stats.seconds
             return whole if skip == "frames" else whole - sum(stages.get(stage, 0.0) for stage in OUTSIDE)
 
-        times, ratio = in_turn({name: functools.partial(next_frame, name) for name in renderers}, rounds)
+        times, ratio = compared({name: functools.partial(next_frame, name) for name in renderers}, rounds)
         if skip == "reflection":  # maps are made in the first frame
             for name, first in firsts.items():
                 frames[name].stats.counters["objects_peeled"] = first.stats.counters.get("objects_peeled", 0)
@@ -203,7 +199,7 @@ def moved(scene: Scene, rounds: int) -> dict[str, Any]:
         frames[name] = renderers[name].render()
         return time.perf_counter() - start
 
-    times, ratio = in_turn({name: functools.partial(next_frame, name) for name in renderers}, rounds)
+    times, ratio = compared({name: functools.partial(next_frame, name) for name in renderers}, rounds)
     return {
         "milliseconds": times,
         "ratio": ratio,
@@ -232,7 +228,7 @@ def culling(scene: Scene, rounds: int) -> dict[str, Any] | None:
         share[name] = seconds["cull"] / sum(seconds.values())
         return seconds["cull"]
 
-    times, _ = in_turn({name: functools.partial(cull, name) for name in ("safe", "flat")}, rounds)
+    times, _ = compared({name: functools.partial(cull, name) for name in ("safe", "flat")}, rounds)
     entering = rays_that_enter(renderers["safe"])
     return {
         "rays": frames["safe"].stats.counters["rays"],
