@@ -48,6 +48,12 @@ def no_hit() -> Hit:
     return hit
 
 
+@wp.func
+def is_number(x: float) -> bool:
+    """Whether x is finite: a comparison, where ``wp.isfinite`` is a call into the C library."""
+    return wp.abs(x) < wp.inf
+
+
 @dataclass(frozen=True)
 class Tracer:
     """A pair of Warp functions and the type of the views that they read.
@@ -111,7 +117,8 @@ def batch_kernel(tracer: Tracer) -> wp.Kernel:
             # Its square may have left float32's range.
             largest = wp.max(wp.abs(direction[0]), wp.max(wp.abs(direction[1]), wp.abs(direction[2])))
             length = largest * wp.length(direction / largest)
-        if wp.isfinite(origin) and wp.isfinite(length) and length > 0.0:
+        is_valid = is_number(origin[0]) and is_number(origin[1]) and is_number(origin[2]) and is_number(length)
+        if is_valid and length > 0.0:
             # Shift and scale in float64: the object may be tiny and far from its origin.
             start = per_half * wp.vec3d(
                 wp.float64(origin[0]) - centre[0], wp.float64(origin[1]) - centre[1], wp.float64(origin[2]) - centre[2]
@@ -119,7 +126,7 @@ def batch_kernel(tracer: Tracer) -> wp.Kernel:
             near = wp.vec3(float(start[0]), float(start[1]), float(start[2]))
             way = direction / length
             skipped = wp.float64(0.0)
-            if wp.max(wp.abs(near)) > NEAR:
+            if wp.abs(near[0]) > NEAR or wp.abs(near[1]) > NEAR or wp.abs(near[2]) > NEAR:
                 # So may the object be from the ray's start: come near in float64, too.
                 exact_way = wp.normalize(
                     wp.vec3d(wp.float64(direction[0]), wp.float64(direction[1]), wp.float64(direction[2]))
@@ -176,7 +183,7 @@ def trace_rays(
     invalid = wp.zeros(n, dtype=wp.uint8, device=device)
     inputs = [views, wp.vec3d(*centre), wp.float64(1.0 / half), origins, directions]
     launch.launch(batch_kernel(tracer), n, [*inputs, t, normal, triangle, barycentrics, invalid], device)
-    return Hits(t, normal, triangle, barycentrics, int(invalid.numpy().sum()))
+    return Hits(t, normal, triangle, barycentrics, int(np.count_nonzero(invalid.numpy())))
 
 
 def _ray_array(rays: Any, name: str, device: wp.Device) -> wp.array:
@@ -191,4 +198,4 @@ def _ray_array(rays: Any, name: str, device: wp.Device) -> wp.array:
         raise InputError(f"{name} must be numbers of shape (n, 3)") from error
     if array.ndim != 2 or array.shape[1] != 3:
         raise InputError(f"{name} must have shape (n, 3), got {array.shape}")
-    return wp.array(array, dtype=wp.vec3, device=device)
+    return wp.array(array, dtype=wp.vec3, device=device, copy=False)  # on the CPU they are only read where they lie
