@@ -58,6 +58,11 @@ class TexelFrame:
         """(rows, columns) = (texels along v, along u) of the map of ``axis``."""
         return self.size[(axis + 2) % 3], self.size[(axis + 1) % 3]
 
+    def cells(self, along_longest: int) -> tuple[int, int, int]:
+        """Cells along x, y and z that cover the box, cubes of which so many lie along its longest side."""
+        x, y, z = (max(1, int(np.ceil(side * along_longest / max(self.size) - 1e-6))) for side in self.size)
+        return x, y, z
+
     @property
     def first_texels(self) -> tuple[int, int, int, int]:
         """Number of the first texel of each axis' map when the three stand in one row, and the total."""

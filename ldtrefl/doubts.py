@@ -13,15 +13,28 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
-from ldtrefl.binning import bin_items
-from ldtrefl.cubemap import TexelFrame
-from ldtrefl.grid import BRICK, CELLS, cell_number, number_of_cell
+from ldtrefl.binning import CHUNK, bin_items, chunk_count, gather_lists, launch_chunks
+from ldtrefl.grid import cell_number, number_of_cell
 from ldtrefl.launch import kernel, launch
-from ldtrefl.patches import FACING, Piece
+from ldtrefl.patches import FACING, Piece, Survey
 
 LARGEST_END = wp.constant(0.25)
 """|n . axis| above ``FACING`` up to which a missing neighbour can be a surface that goes on in another map, and not an
 edge: with more, fast patches stuck out over the edges of a box."""
+
+
+POINTS = wp.constant(5)
+"""Points of a patch, which is smaller than a cell of the survey, whose cells it is said to lie in."""
+
+
+@wp.func
+def cell_of_point(cells: wp.vec3i, piece: Piece, k: int) -> int:
+    """The cell that holds the ``k``-th point of a patch: its corners and its middle."""
+    along_u, along_v = 0.5, 0.5
+    if k < 4:
+        along_u, along_v = float(k % 2), float(k / 2)
+    p = piece.corner + along_u * piece.edge_u + along_v * piece.edge_v
+    return number_of_cell(cells, cell_number(p[0], cells[0]), cell_number(p[1], cells[1]), cell_number(p[2], cells[2]))
 
 
 @wp.struct
@@ -34,7 +47,7 @@ class PatchMap:
     size: wp.vec3i  # texels
     first_texel: wp.vec3i
     cells_per_texel: float
-    bricks: wp.vec3i
+    cells: wp.vec3i
 
 
 @wp.func
@@ -111,13 +124,8 @@ def find_doubts(
         doubtful = doubtful or following < 0 or (following == 0 and not may_end)
     patch_out[i] = wp.where(doubtful, wp.uint8(1), wp.uint8(0))
     if doubtful:
-        nx, ny, nz = BRICK * maps.bricks[0], BRICK * maps.bricks[1], BRICK * maps.bricks[2]
-        for k in range(5):
-            p = middle
-            if k < 4:
-                p = piece.corner + float(k % 2) * piece.edge_u + float(k / 2) * piece.edge_v
-            x, y, z = cell_number(p[0], nx), cell_number(p[1], ny), cell_number(p[2], nz)
-            cell_out[number_of_cell(maps.bricks, x, y, z)] = wp.uint8(1)
+        for k in range(POINTS):
+            cell_out[cell_of_point(maps.cells, piece, k)] = wp.uint8(1)
 
 
 @kernel
@@ -125,22 +133,49 @@ def find_near(
     first: int,
     # In:
     doubtful: wp.array(dtype=wp.uint8),
-    bricks: wp.vec3i,
+    cells: wp.vec3i,
     # Out: 1 for cells beside a doubtful one, and for those
     near_out: wp.array(dtype=wp.uint8),
 ):
-    brick = first + wp.tid()
-    nx, ny, nz = BRICK * bricks[0], BRICK * bricks[1], BRICK * bricks[2]
-    corner_x = BRICK * (brick % bricks[0])
-    corner_y = BRICK * ((brick / bricks[0]) % bricks[1])
-    corner_z = BRICK * (brick / (bricks[0] * bricks[1]))
-    for k in range(CELLS):
-        if doubtful[CELLS * brick + k] != wp.uint8(0):
-            x, y, z = corner_x + k % BRICK, corner_y + (k / BRICK) % BRICK, corner_z + k / (BRICK * BRICK)
-            for dz in range(wp.max(z - 1, 0), wp.min(z + 2, nz)):
-                for dy in range(wp.max(y - 1, 0), wp.min(y + 2, ny)):
-                    for dx in range(wp.max(x - 1, 0), wp.min(x + 2, nx)):
-                        near_out[number_of_cell(bricks, dx, dy, dz)] = wp.uint8(1)
+    i = first + wp.tid()
+    if doubtful[i] == wp.uint8(0):
+        return
+    x, y, z = i % cells[0], (i / cells[0]) % cells[1], i / (cells[0] * cells[1])
+    for z_beside in range(wp.max(z - 1, 0), wp.min(z + 2, cells[2])):
+        for y_beside in range(wp.max(y - 1, 0), wp.min(y + 2, cells[1])):
+            for x_beside in range(wp.max(x - 1, 0), wp.min(x + 2, cells[0])):
+                near_out[number_of_cell(cells, x_beside, y_beside, z_beside)] = wp.uint8(1)
+
+
+@kernel
+def list_sure(
+    first: int,
+    # In:
+    patches: wp.array(dtype=Piece),
+    doubtful: wp.array(dtype=wp.uint8),  # cells; empty: none is
+    cells: wp.vec3i,
+    # Out, per chunk: patches outside doubtful cells, and their list as items; 1 for cells with one of them, the same
+    # value from whoever writes
+    count_out: wp.array(dtype=wp.int32),
+    list_out: wp.array(dtype=wp.int32),
+    touched_out: wp.array(dtype=wp.uint8),
+):
+    chunk = first + wp.tid()
+    begin = CHUNK * chunk
+    count = int(0)
+    for i in range(begin, wp.min(begin + CHUNK, patches.shape[0])):
+        piece = patches[i]
+        is_sure = bool(True)
+        if doubtful.shape[0] > 0:
+            for k in range(POINTS):
+                if doubtful[cell_of_point(cells, piece, k)] != wp.uint8(0):
+                    is_sure = False
+        if is_sure:
+            list_out[begin + count] = -1 - i
+            count += 1
+            for k in range(POINTS):
+                touched_out[cell_of_point(cells, piece, k)] = wp.uint8(1)
+    count_out[chunk] = count
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,47 +183,46 @@ class Doubts:
     """Where patches are in doubt."""
 
     patches: wp.array
-    """(n,) ``Piece``, texel by texel."""
+    """(n,) ``Piece``."""
     share: float
     """Of all patches, those in doubt."""
     cells: wp.array
-    """(cells,) uint8, 1 for doubtful ones."""
+    """(cells,) uint8, 1 for doubtful cells of the survey; empty if none is."""
     near: wp.array
     """(cells,) uint8, 1 for those and the cells beside them."""
+    survey_cells: wp.vec3i
+
+    def sure_patches(self) -> tuple[wp.array, wp.array]:
+        """The patches outside doubtful cells as items, -1 for patch 0; and (cells,) uint8, 1 for their cells."""
+        device, count = self.patches.device, self.patches.shape[0]
+        counts = wp.zeros(chunk_count(count) + 1, dtype=wp.int32, device=device)
+        listed, touched = wp.empty(count, dtype=wp.int32, device=device), wp.zeros_like(self.near)
+        inputs = [self.patches, self.cells, self.survey_cells, counts, listed, touched]
+        launch_chunks(list_sure, count, inputs, device)
+        return gather_lists(listed, counts), touched
 
 
-def no_doubts(patches: wp.array, bricks: wp.vec3i) -> Doubts:
+def no_doubts(survey: Survey) -> Doubts:
     """All patches are good enough."""
+    patches, _ = survey.patches()
+    nx, ny, nz = survey.cells
     nothing = wp.empty(0, dtype=wp.uint8, device=patches.device)
-    cells = bricks[0] * bricks[1] * bricks[2] * int(CELLS)
-    return Doubts(patches, 0.0, nothing, wp.zeros(cells, dtype=wp.uint8, device=patches.device))
+    return Doubts(patches, 0.0, nothing, wp.zeros(nx * ny * nz, dtype=wp.uint8, device=patches.device), survey.cells)
 
 
-def doubts_of(
-    frame: TexelFrame,
-    cells_per_texel: float,
-    bricks: wp.vec3i,
-    patches: wp.array,
-    texel: wp.array,
-    largest_turn: float,
-) -> Doubts:
-    """Compare every patch with its neighbours.
-
-    Args:
-        patches: (n,) ``Piece``.
-        texel: (n,) int32, the texel of each.
-        largest_turn: radians between neighbours from which they are in doubt.
-    """
+def doubts_of(survey: Survey, largest_turn: float) -> Doubts:
+    """Compare every patch with its neighbours; ``largest_turn`` in radians is when they are in doubt."""
+    frame, (patches, texel) = survey.frame, survey.patches()
     device, count = patches.device, patches.shape[0]
     maps = PatchMap()
     maps.start, places = bin_items(texel, frame.first_texels[3], device)
     maps.patches, maps.texel = wp.empty_like(patches), wp.empty_like(texel)
     launch(sort_patches, count, [patches, texel, places, maps.patches, maps.texel], device)
     maps.size, maps.first_texel = wp.vec3i(*frame.size), wp.vec3i(*frame.first_texels[:3])
-    maps.cells_per_texel, maps.bricks = cells_per_texel, bricks
+    maps.cells_per_texel, maps.cells = survey.cells_per_texel, survey.cells
     doubtful = wp.empty(count, dtype=wp.uint8, device=device)
-    brick_count = bricks[0] * bricks[1] * bricks[2]
-    cells, near = (wp.zeros(brick_count * int(CELLS), dtype=wp.uint8, device=device) for _ in range(2))
+    cell_count = survey.cells[0] * survey.cells[1] * survey.cells[2]
+    cells, near = (wp.zeros(cell_count, dtype=wp.uint8, device=device) for _ in range(2))
     launch(find_doubts, count, [maps, largest_turn, doubtful, cells], device)
-    launch(find_near, brick_count, [cells, bricks, near], device)
-    return Doubts(maps.patches, int(np.count_nonzero(doubtful.numpy())) / count, cells, near)
+    launch(find_near, cell_count, [cells, survey.cells, near], device)
+    return Doubts(maps.patches, int(np.count_nonzero(doubtful.numpy())) / count, cells, near, survey.cells)

@@ -1,16 +1,18 @@
 """The occupancy grid over a layered depth texture: where its surfaces are, and what lies there.
 
-*Cell space* is texel space divided so that a cell is 1 wide; a *brick* is 4 x 4 x 4 cells. Three levels, each small
-enough for its cache:
+*Cell space* is texel space divided so that a cell is 1 wide. A few dozen cells lie along an object's longest side, so
+that the grid itself stays in the cache:
 
-- ``leaps``: per octant of directions and brick, how many bricks a ray of that octant may leap; 0 in an occupied one.
-- ``mask``: 64 bits per occupied brick, one per cell.
-- *records*: what a cell holds, in blocks of 8 that are tested at once.
+- ``leaps``: per octant of directions and cell, how many cells a ray of that octant may leap; 0 in an occupied one.
+- *boxes*: what lies in an occupied cell, in blocks of 8 records; the boxes about 8 blocks make a node and are tested
+  at once.
+- *records*: the 8 of a block are tested at once.
 
-A record is a piece of a plane with two barycentric coordinates that are linear in the plane's points, 13 numbers in
-the brick's own coordinates (Havel and Herout 2010). It is either a *triangle* of the mesh, exact, in every cell that
-it touches; or a *patch*: a fragment's texel lifted to its plane, kept in the maps whose axis it faces. Triangles where
-they are larger than texels, patches where many share a texel: the cost of a search stays, whatever the mesh.
+A record lies in coordinates from the cell's corner. It is either a *triangle* of the mesh, exact, in every cell that it
+touches: its plane and two barycentric coordinates that are linear in the plane's points (Havel and Herout 2010). Or it
+is a *patch*: a fragment's texel lifted to its plane, kept in the maps whose axis it faces: the plane and the middle of
+the texel, half as many numbers. Triangles where they are larger than texels, patches where many share a texel: the cost
+of a search stays, whatever the mesh. A cell has two lists, first its patches, then its triangles.
 """
 
 from __future__ import annotations
@@ -23,35 +25,35 @@ import numpy as np
 import warp as wp
 
 LANES = wp.constant(8)
-"""Records in a block: the width of AVX2. 16 measured the same, 4 slower on dense meshes."""
-ROWS = wp.constant(13)
-"""Numbers in a record."""
-BRICK = wp.constant(4)
-"""Cells along a side of a brick."""
-CELLS = wp.constant(64)
-"""Cells in a brick: the bits of a mask."""
+"""Records in a block, and blocks in a node: the width of AVX2. 16 measured the same, 4 slower on dense meshes."""
+TRIANGLE_ROWS = wp.constant(13)
+"""Numbers of a triangle: its plane's n and n . p; two barycentric coordinates, linear in the point; its bits."""
+PATCH_ROWS = wp.constant(8)
+"""Numbers of a patch: its plane's n and n . p; the middle of its texel; the bits of its triangle and of its kind."""
+SIDES = wp.constant(6)
+"""Numbers in a box: low and high along x, y, z."""
 
-TRIANGLE = wp.constant(1.0)
-SMALL_PATCH = wp.constant(2.0)
-LARGE_PATCH = wp.constant(3.0)
-"""Kinds of records, and the limit of the sum of their two coordinates. A small patch's triangle is smaller than the
-patch, so any of its points will do for a hit's barycentrics; a large one's must be fetched."""
+TRIANGLE = wp.constant(-1)
+"""Kind of a record that is a triangle; a patch's is the axis of its map, and ``LARGE`` if its triangle is larger than
+its texel: that one's barycentrics are looked for, while of a small one any of its points will do."""
+LARGE = wp.constant(4)
 
 
 @wp.struct
 class GridView:
     """An occupancy grid and its mesh."""
 
-    leaps: wp.array(dtype=wp.uint8)  # octant * bricks + brick
-    brick: wp.array(dtype=wp.int32)  # number among the occupied bricks, -1 if empty
-    mask: wp.array(dtype=wp.uint64)  # per occupied brick
-    block: wp.array(dtype=wp.int32)  # first block of each cell of each occupied brick; ends with the total
-    rows: wp.array(dtype=wp.float32)  # block, row, lane
-    triangle: wp.array(dtype=wp.int32)  # block, lane
-    bricks: wp.vec3i  # along x, y, z
+    leaps: wp.array(dtype=wp.uint8)  # octant * cells + cell
+    node: wp.array(dtype=wp.int32)  # first node of each list, two a cell; ends with the total
+    row: wp.array(dtype=wp.int32)  # first row of each list's first block; ends with the total
+    boxes: wp.array(dtype=wp.float32)  # node, side, lane
+    rows: wp.array(dtype=wp.float32)  # row, lane; a block's rows follow each other
+    cells: wp.vec3i  # along x, y, z
     low: wp.vec3  # the object's box, cell space
     high: wp.vec3
     front: float  # side of the records that can be seen from outside, 1 or -1 along their normals; 0 if not known
+    half_patch: float  # half the side of a patch in its map, cells
+    horizon: float  # how far past a doubted hit a search goes on, cells
     cells_per_unit: float  # cell = cells_per_unit * unit + cell_offset
     cell_offset: wp.vec3
     vertices: wp.array(dtype=wp.vec3)  # unit space
@@ -65,19 +67,17 @@ def cell_number(x: float, cells: int) -> int:
 
 
 @wp.func
-def number_of_cell(bricks: wp.vec3i, x: int, y: int, z: int) -> int:
-    """Number of a cell among all: brick by brick, 64 cells each."""
-    brick = ((z / BRICK) * bricks[1] + y / BRICK) * bricks[0] + x / BRICK
-    return CELLS * brick + ((z % BRICK) * BRICK + y % BRICK) * BRICK + x % BRICK
+def number_of_cell(cells: wp.vec3i, x: int, y: int, z: int) -> int:
+    """Number of a cell among all, row by row."""
+    return (z * cells[1] + y) * cells[0] + x
 
 
 _DTYPES = {
     "leaps": wp.uint8,
-    "brick": wp.int32,
-    "mask": wp.uint64,
-    "block": wp.int32,
+    "node": wp.int32,
+    "row": wp.int32,
+    "boxes": wp.float32,
     "rows": wp.float32,
-    "triangle": wp.int32,
 }
 """The arrays that are a grid's own."""
 
@@ -97,8 +97,8 @@ class Grid:
         """(arrays, values) that :meth:`unpacked` makes the same grid from, the mesh left out."""
         arrays = {name: getattr(self.view, name).numpy() for name in _DTYPES}
         values = {name: [float(x) for x in getattr(self.view, name)] for name in ("low", "high", "cell_offset")}
-        values["bricks"] = [int(n) for n in self.view.bricks]
-        plain = {name: float(getattr(self.view, name)) for name in ("front", "cells_per_unit")}
+        values["cells"] = [int(n) for n in self.view.cells]
+        plain = {name: float(getattr(self.view, name)) for name in ("front", "half_patch", "horizon", "cells_per_unit")}
         return arrays, {**values, **plain, "records": int(self.records), "patches": bool(self.patches)}
 
     @classmethod
@@ -111,14 +111,15 @@ class Grid:
             setattr(view, name, wp.array(arrays[name], dtype=dtype, device=vertices.device, copy=False))
         for name in ("low", "high", "cell_offset"):
             setattr(view, name, wp.vec3(*values[name]))
-        view.bricks = wp.vec3i(*values["bricks"])
-        view.front, view.cells_per_unit = values["front"], values["cells_per_unit"]
+        view.cells = wp.vec3i(*values["cells"])
+        for name in ("front", "half_patch", "horizon", "cells_per_unit"):
+            setattr(view, name, values[name])
         view.vertices, view.faces = vertices, faces
         return cls(view, values["records"], values["patches"])
 
     @functools.cached_property
     def view_without_leaps(self) -> Any:
-        """The ``GridView`` in which empty bricks are crossed one by one, to measure what the leaps save."""
+        """The ``GridView`` in which empty cells are crossed one by one, to measure what the leaps save."""
         view = GridView()
         for name in vars(GridView)["vars"]:
             setattr(view, name, getattr(self.view, name))

@@ -1,10 +1,11 @@
 """Mesh -> occupancy grid (``grid.py``): make the records, find the cells they touch, lay out what is occupied.
 
-patches, or triangles -> (cell, record) pairs -> sort by cell -> bricks, masks, leaps -> blocks of records
+patches, or triangles -> (cell, record) pairs -> sort by cell and place -> blocks of records, boxes, leaps
 """
 
 from __future__ import annotations
 
+import math
 from typing import Any, Literal
 
 import numpy as np
@@ -15,18 +16,30 @@ from ldtrefl.binning import bin_items, exclusive_scan
 from ldtrefl.cubemap import TexelFrame, texel_frame
 from ldtrefl.device_scene import DeviceMesh
 from ldtrefl.doubts import Doubts, doubts_of, no_doubts
-from ldtrefl.grid import BRICK, CELLS, LANES, ROWS, TRIANGLE, Grid, GridView, cell_number, number_of_cell
-from ldtrefl.patches import Piece, Survey
+from ldtrefl.grid import (
+    LANES,
+    LARGE,
+    PATCH_ROWS,
+    SIDES,
+    TRIANGLE,
+    TRIANGLE_ROWS,
+    Grid,
+    GridView,
+    cell_number,
+    number_of_cell,
+)
+from ldtrefl.patches import PATCH_MARGIN, Piece, Survey
 
 Quality = Literal["fast", "balanced", "exact"]
 
-GRID_CELLS = 48
-"""Cells along the longest side of an ordinary grid. Of 32, 48, 64 and 96 the fastest, within 3%, on the median of the
-real test meshes; 32 is faster on the smallest, 64 on the largest."""
-FAST_GRID_CELLS = 32
-"""The same for the large patches of a fast grid."""
-DENSE_GRID_CELLS = 128
-"""The same where every triangle of a dense mesh is kept."""
+FEWEST_CELLS, MOST_CELLS = 8, 64
+CELLS_PER_ROOT = 0.08
+"""Cells along the longest side per square root of the records, from the fewest to the most: some 50 to 200 records then
+lie in an occupied cell. Of 16, 24, 32, 36 and 48 the fastest on knots and scans of 10,000 to 100,000, within 4%."""
+SURVEY_CELLS = 48
+"""Cells along the longest side in which patches and triangles are told apart."""
+SURVEY_CELLS_PER_PATCH = 0.5
+"""The same for coarser maps: cells to the side of a patch, which must be smaller than a cell."""
 
 PATCH_TEXELS: dict[Quality, float] = {"fast": 4.0, "balanced": 1.6}
 """Texels along a side of a patch. The plane of one is off by the square of its side: on a torus knot at 256, 1.6 texels
@@ -44,16 +57,13 @@ FEW_TRIANGLES = 50_000
 """Triangles up to which all are kept, however fine: they fit in the cache, and a thin object stays exact."""
 FEWEST_TRIANGLES = 2_000
 """The same in maps that are trusted: fewer take no more room than patches."""
-CELLS_PER_TEXEL = 0.3
-"""Cells in a texel of the patches, as ``GRID_CELLS`` has at the default resolution: coarser maps need no more."""
-DENSE_TRIANGLES = 300_000
-"""Triangles from which a grid that keeps them all has more cells."""
-
 CELL_MARGIN = wp.constant(1.0e-3)
 """Cells by which cells are widened when records are put into them, for the rounding of rays."""
-PATCH_RISE = wp.vec3(0.1)
-"""Cells, a third of a patch, by which the box is widened for patches that rise out of it where the surface bends.
-Without it one ray in ten thousand slipped under them to the far wall."""
+PATCH_RISE = 1.0 / 3.0
+"""Of a patch's side, by which the box is widened for patches that rise out of it where the surface bends. Without it
+one ray in ten thousand slipped under them to the far wall."""
+HORIZON = 1.0 / 3.0
+"""Of a patch's side, how far past a doubted hit a search goes on."""
 ROUNDING = wp.constant(1.5e-7)
 """Of a ray's coordinates in cells, relative to the grid's size: two roundings of a float32."""
 THINNEST = wp.constant(6.0e-7)
@@ -61,7 +71,11 @@ THINNEST = wp.constant(6.0e-7)
 MASK_BITS = wp.constant(64)
 """Cells of an item's box up to which it is kept which of them it touches: that is the dearest thing to find out."""
 LARGEST_LEAP = wp.constant(250)
-"""Bricks: what fits in a byte, and more than a grid has."""
+"""Cells: what fits in a byte, and more than a grid has."""
+EMPTY = wp.constant(1.0e30)
+"""Sides of a box with nothing in it: its low is above its high."""
+SUBCELLS = wp.constant(64)
+"""Parts of a cell, 4 x 4 x 4, in whose order its records stand, so that the 8 of a block lie together."""
 
 
 @wp.struct
@@ -79,10 +93,10 @@ class GridTarget:
     vertices: wp.array(dtype=wp.vec3)  # unit space
     faces: wp.array(dtype=wp.vec3i)
     patches: wp.array(dtype=Piece)
-    doubtful: wp.array(dtype=wp.uint8)  # 1 for cells that no patch goes into; empty: none
+    cells_per_survey_cell: float
     cells_per_unit: float
     cell_offset: wp.vec3
-    bricks: wp.vec3i
+    cells: wp.vec3i
 
 
 @wp.func
@@ -106,20 +120,38 @@ def piece_of(target: GridTarget, item: int) -> Piece:
     """Items from 0 are triangles, below 0 patches: -1 is patch 0."""
     if item >= 0:
         return triangle_piece(target, item)
-    return target.patches[-1 - item]
+    piece = target.patches[-1 - item]
+    piece.corner = target.cells_per_survey_cell * piece.corner
+    piece.edge_u = target.cells_per_survey_cell * piece.edge_u
+    piece.edge_v = target.cells_per_survey_cell * piece.edge_v
+    return piece
+
+
+@wp.func
+def low_corner(piece: Piece) -> wp.vec3:
+    """Of the box about a piece."""
+    b, c = piece.corner + piece.edge_u, piece.corner + piece.edge_v
+    low = wp.min(piece.corner, wp.min(b, c))
+    if piece.kind > TRIANGLE:
+        low = wp.min(low, b + piece.edge_v)
+    return low
+
+
+@wp.func
+def high_corner(piece: Piece) -> wp.vec3:
+    """Of the box about a piece."""
+    b, c = piece.corner + piece.edge_u, piece.corner + piece.edge_v
+    high = wp.max(piece.corner, wp.max(b, c))
+    if piece.kind > TRIANGLE:
+        high = wp.max(high, b + piece.edge_v)
+    return high
 
 
 @wp.func
 def cells_touched(target: GridTarget, piece: Piece) -> CellBox:
     """The cells of the box about a piece."""
-    b, c = piece.corner + piece.edge_u, piece.corner + piece.edge_v
-    low = wp.min(piece.corner, wp.min(b, c))
-    high = wp.max(piece.corner, wp.max(b, c))
-    if piece.kind > TRIANGLE:
-        d = b + piece.edge_v
-        low = wp.min(low, d)
-        high = wp.max(high, d)
-    nx, ny, nz = BRICK * target.bricks[0], BRICK * target.bricks[1], BRICK * target.bricks[2]
+    low, high = low_corner(piece), high_corner(piece)
+    nx, ny, nz = target.cells[0], target.cells[1], target.cells[2]
     m = CELL_MARGIN
     box = CellBox()
     box.first = wp.vec3i(cell_number(low[0] - m, nx), cell_number(low[1] - m, ny), cell_number(low[2] - m, nz))
@@ -168,11 +200,11 @@ def touches_cell(piece: Piece, x: int, y: int, z: int) -> bool:
 
 
 @wp.func
-def item_number(target: GridTarget, items: wp.array(dtype=wp.int32), i: int) -> int:
-    """The ``i``-th item: of those listed; else of all patches; else of all triangles."""
+def item_number(items: wp.array(dtype=wp.int32), i: int) -> int:
+    """The ``i``-th item: of those listed; else of all triangles."""
     if items.shape[0] > 0:
         return items[i]
-    return wp.where(target.patches.shape[0] > 0, -1 - i, i)
+    return i
 
 
 @wp.func
@@ -183,11 +215,13 @@ def fits_mask(box: CellBox) -> bool:
 
 
 @wp.func
-def belongs(target: GridTarget, piece: Piece, x: int, y: int, z: int) -> bool:
-    """Whether a piece may go into a cell."""
-    if piece.kind == TRIANGLE or target.doubtful.shape[0] == 0:
-        return True
-    return target.doubtful[number_of_cell(target.bricks, x, y, z)] == wp.uint8(0)
+def subcell(piece: Piece, x: int, y: int, z: int) -> int:
+    """The part of a cell that holds the middle of what lies of a piece in it, in Morton order."""
+    corner = wp.vec3(float(x), float(y), float(z))
+    low, high = wp.max(low_corner(piece), corner), wp.min(high_corner(piece), corner + wp.vec3(1.0))
+    middle = 0.5 * (low + high) - corner
+    u, v, w = cell_number(4.0 * middle[0], 4), cell_number(4.0 * middle[1], 4), cell_number(4.0 * middle[2], 4)
+    return 32 * (w / 2) + 16 * (v / 2) + 8 * (u / 2) + 4 * (w % 2) + 2 * (v % 2) + u % 2
 
 
 @launch.kernel
@@ -199,9 +233,10 @@ def find_cells(
     # Out:
     counts_out: wp.array(dtype=wp.int32),
     masks_out: wp.array(dtype=wp.uint64),  # bit k: the item touches cell k of its box; of small boxes only
+    touched_out: wp.array(dtype=wp.int32),  # 1 for cells with an item: the same value from whoever writes
 ):
     i = first + wp.tid()
-    piece = piece_of(target, item_number(target, items, i))
+    piece = piece_of(target, item_number(items, i))
     box = cells_touched(target, piece)
     is_one_cell = box.first == box.last
     is_masked = fits_mask(box)
@@ -211,8 +246,9 @@ def find_cells(
     for z in range(box.first[2], box.last[2] + 1):
         for y in range(box.first[1], box.last[1] + 1):
             for x in range(box.first[0], box.last[0] + 1):
-                if belongs(target, piece, x, y, z) and (is_one_cell or touches_cell(piece, x, y, z)):
+                if is_one_cell or touches_cell(piece, x, y, z):
                     count += 1
+                    touched_out[number_of_cell(target.cells, x, y, z)] = 1
                     if is_masked:
                         mask = mask | bit
                 bit = bit << wp.uint64(1)
@@ -228,16 +264,14 @@ def list_cells(
     items: wp.array(dtype=wp.int32),
     masks: wp.array(dtype=wp.uint64),
     places: wp.array(dtype=wp.int32),
+    number: wp.array(dtype=wp.int32),
     # Out:
-    cell_out: wp.array(dtype=wp.int32),
+    part_out: wp.array(dtype=wp.int32),  # the subcell, for patches and for triangles, of the occupied cell
     item_out: wp.array(dtype=wp.int32),
-    touched_out: wp.array(dtype=wp.uint8),  # 1 for cells with a pair: the same value from whoever writes
 ):
     i = first + wp.tid()
     place = int(places[i])
-    if place == places[i + 1]:
-        return
-    item = item_number(target, items, i)
+    item = item_number(items, i)
     piece = piece_of(target, item)
     box = cells_touched(target, piece)
     is_masked = fits_mask(box)
@@ -247,79 +281,67 @@ def list_cells(
             for x in range(box.first[0], box.last[0] + 1):
                 is_touched = (mask & wp.uint64(1)) != wp.uint64(0)
                 if not is_masked:
-                    is_touched = belongs(target, piece, x, y, z) and touches_cell(piece, x, y, z)
+                    is_touched = touches_cell(piece, x, y, z)
                 if is_touched:
-                    cell = number_of_cell(target.bricks, x, y, z)
-                    cell_out[place] = cell
+                    cell = number[number_of_cell(target.cells, x, y, z)]
+                    which = wp.where(piece.kind == TRIANGLE, 1, 0)
+                    part_out[place] = SUBCELLS * (2 * cell + which) + subcell(piece, x, y, z)
                     item_out[place] = item
-                    touched_out[cell] = wp.uint8(1)
                     place += 1
                 mask = mask >> wp.uint64(1)
 
 
 @launch.kernel
-def find_occupied_bricks(
+def put_in_order(
     first: int,
     # In:
-    start: wp.array(dtype=wp.int32),
+    item: wp.array(dtype=wp.int32),
+    places: wp.array(dtype=wp.int32),
     # Out:
-    occupied_out: wp.array(dtype=wp.int32),
-    blocks_out: wp.array(dtype=wp.int32),
+    item_out: wp.array(dtype=wp.int32),
 ):
-    brick = first + wp.tid()
-    blocks = int(0)
-    for cell in range(CELLS * brick, CELLS * brick + CELLS):
-        blocks += (start[cell + 1] - start[cell] + LANES - 1) / LANES
-    occupied_out[brick] = wp.where(blocks > 0, 1, 0)
-    blocks_out[brick] = blocks
+    i = first + wp.tid()
+    item_out[places[i]] = item[i]
 
 
 @launch.kernel
-def lay_out_bricks(
+def measure_lists(
     first: int,
     # In:
     start: wp.array(dtype=wp.int32),
     number: wp.array(dtype=wp.int32),
-    first_block: wp.array(dtype=wp.int32),
-    # Out:
-    brick_out: wp.array(dtype=wp.int32),
-    mask_out: wp.array(dtype=wp.uint64),
-    block_out: wp.array(dtype=wp.int32),
-    rows_out: wp.array(dtype=wp.float32),  # a cell's last block cleared: it may be filled in part
+    # Out: per occupied cell, its place among all; per list, rows and nodes
+    cell_out: wp.array(dtype=wp.int32),
+    rows_out: wp.array(dtype=wp.int32),
+    nodes_out: wp.array(dtype=wp.int32),
 ):
-    brick = first + wp.tid()
-    if number[brick] == number[brick + 1]:
-        brick_out[brick] = -1
-        return
-    occupied = number[brick]
-    brick_out[brick] = occupied
-    mask = wp.uint64(0)
-    block = int(first_block[brick])
-    for k in range(CELLS):
-        block_out[CELLS * occupied + k] = block
-        records = start[CELLS * brick + k + 1] - start[CELLS * brick + k]
-        if records > 0:
-            mask = mask | (wp.uint64(1) << wp.uint64(k))
-            block += (records + LANES - 1) / LANES
-            for i in range(LANES * ROWS * (block - 1), LANES * ROWS * block):
-                rows_out[i] = 0.0
-    block_out[CELLS * occupied + CELLS] = block
-    mask_out[occupied] = mask
+    cell = first + wp.tid()
+    occupied = number[cell]
+    is_occupied = occupied < number[cell + 1]
+    if is_occupied:
+        cell_out[occupied] = cell
+    for which in range(2):
+        blocks = int(0)
+        if is_occupied:
+            part = SUBCELLS * (2 * occupied + which)
+            blocks = (start[part + SUBCELLS] - start[part] + LANES - 1) / LANES
+        rows_out[2 * cell + which] = blocks * wp.where(which == 0, PATCH_ROWS, TRIANGLE_ROWS)
+        nodes_out[2 * cell + which] = (blocks + LANES - 1) / LANES
 
 
 @launch.kernel
 def find_leaps(
     first: int,
     # In:
-    brick: wp.array(dtype=wp.int32),
-    bricks: wp.vec3i,
+    node: wp.array(dtype=wp.int32),
+    cells: wp.vec3i,
     # Out:
     leaps_out: wp.array(dtype=wp.uint8),
 ):
-    # The largest empty cube of bricks that starts at a brick and grows along the octant is one larger than the
+    # The largest empty cube of cells that starts at a cell and grows along the octant is one larger than the
     # smallest of its seven neighbours' that way; beyond the grid all is empty.
     octant = first + wp.tid()
-    nx, ny, nz = bricks[0], bricks[1], bricks[2]
+    nx, ny, nz = cells[0], cells[1], cells[2]
     base = octant * nx * ny * nz
     dx = wp.where(octant % 2 == 1, 1, -1)
     dy = wp.where((octant / 2) % 2 == 1, nx, -nx)
@@ -332,7 +354,7 @@ def find_leaps(
                 x = wp.where(dx > 0, nx - 1 - step_x, step_x)
                 i = (z * ny + y) * nx + x
                 leap = int(0)
-                if brick[i] < 0:
+                if node[2 * i] == node[2 * i + 2]:
                     smallest = int(LARGEST_LEAP - 1)
                     if step_x > 0:
                         smallest = wp.min(smallest, int(leaps_out[base + i + dx]))
@@ -364,63 +386,98 @@ def as_single(p: wp.vec3d) -> wp.vec3:
     return wp.vec3(float(p[0]), float(p[1]), float(p[2]))
 
 
-@launch.kernel
-def fill_records(
-    first: int,
-    # In:
-    target: GridTarget,
-    cell: wp.array(dtype=wp.int32),
-    item: wp.array(dtype=wp.int32),
-    places: wp.array(dtype=wp.int32),
-    start: wp.array(dtype=wp.int32),
-    number: wp.array(dtype=wp.int32),
-    block: wp.array(dtype=wp.int32),
-    # Out:
-    rows_out: wp.array(dtype=wp.float32),
-    triangle_out: wp.array(dtype=wp.int32),
-):
-    i = first + wp.tid()
-    brick = cell[i] / CELLS
-    rank = places[i] - start[cell[i]]
-    at = block[CELLS * number[brick] + cell[i] % CELLS] + rank / LANES
-    lane = rank % LANES
-    x, y = brick % target.bricks[0], (brick / target.bricks[0]) % target.bricks[1]
-    z = brick / (target.bricks[0] * target.bricks[1])
-    piece = piece_of(target, item[i])
-    triangle_out[LANES * at + lane] = piece.triangle
-    corner = piece.corner - float(BRICK) * wp.vec3(float(x), float(y), float(z))
+@wp.func
+def write_patch(piece: Piece, cell: wp.vec3, row: int, rows: wp.array(dtype=float)):
+    """Write a patch in a cell as the record at ``row``."""
+    middle = piece.corner - cell + 0.5 * (piece.edge_u + piece.edge_v)
+    unit = wp.normalize(wp.cross(piece.edge_u, piece.edge_v))
+    axis = piece.kind % LARGE
+    for k in range(3):
+        rows[row + k * LANES] = unit[k]
+    rows[row + 3 * LANES] = wp.dot(unit, middle)
+    rows[row + 4 * LANES] = middle[(axis + 1) % 3]
+    rows[row + 5 * LANES] = middle[(axis + 2) % 3]
+    rows[row + 6 * LANES] = wp.cast(piece.triangle, wp.float32)
+    rows[row + 7 * LANES] = wp.cast(piece.kind, wp.float32)
+
+
+@wp.func
+def write_triangle(target: GridTarget, piece: Piece, cell: wp.vec3, row: int, rows: wp.array(dtype=float)):
+    """Write a triangle in a cell as the record at ``row``; of one without area nothing but 0."""
     # In float64: of a slim triangle's cross product float32 leaves a plane that misses its far corner.
     u, v = as_double(piece.edge_u), as_double(piece.edge_v)
     normal = wp.cross(u, v)
     square = wp.dot(normal, normal)
     longest = wp.max(wp.dot(v - u, v - u), wp.max(wp.dot(u, u), wp.dot(v, v)))
-    thin = wp.float64(THINNEST * target.cells_per_unit)
-    row = LANES * ROWS * at + lane
-    if square > thin * thin * longest:
-        unit = as_single(normal / wp.sqrt(square))
-        along_u = as_single(wp.cross(v, normal) / square)
-        along_v = as_single(wp.cross(normal, u) / square)
-        at_u, at_v = -wp.dot(along_u, corner), -wp.dot(along_v, corner)
-        if piece.kind == TRIANGLE:
-            # Move the sides apart by a ray's rounding, which is many barycentric units where a triangle is slim.
-            reach = ROUNDING * float(BRICK * wp.max(target.bricks))
-            beside_u, beside_v = reach * wp.length(along_u), reach * wp.length(along_v)
-            widening = 1.0 + beside_u + beside_v + reach * wp.length(along_u + along_v)
-            along_u = along_u / widening
-            along_v = along_v / widening
-            at_u = (at_u + beside_u) / widening
-            at_v = (at_v + beside_v) / widening
-        for k in range(3):
-            rows_out[row + k * LANES] = unit[k]
-            rows_out[row + (4 + k) * LANES] = along_u[k]
-            rows_out[row + (8 + k) * LANES] = along_v[k]
-        rows_out[row + 3 * LANES] = wp.dot(unit, corner)
-        rows_out[row + 7 * LANES] = at_u
-        rows_out[row + 11 * LANES] = at_v
-        rows_out[row + 12 * LANES] = piece.kind
-    else:
-        for k in range(ROWS):
-            rows_out[row + k * LANES] = 0.0
+    thinnest = wp.float64(THINNEST * target.cells_per_unit)
+    if not square > thinnest * thinnest * longest:
+        for k in range(TRIANGLE_ROWS):
+            rows[row + k * LANES] = 0.0
+        return
+    corner = piece.corner - cell
+    unit = as_single(normal / wp.sqrt(square))
+    along_u = as_single(wp.cross(v, normal) / square)
+    along_v = as_single(wp.cross(normal, u) / square)
+    # Move the sides apart by a ray's rounding, which is many barycentric units where a triangle is slim.
+    reach = ROUNDING * float(wp.max(target.cells))
+    beside_u, beside_v = reach * wp.length(along_u), reach * wp.length(along_v)
+    widening = 1.0 + beside_u + beside_v + reach * wp.length(along_u + along_v)
+    for k in range(3):
+        rows[row + k * LANES] = unit[k]
+        rows[row + (4 + k) * LANES] = along_u[k] / widening
+        rows[row + (8 + k) * LANES] = along_v[k] / widening
+    rows[row + 3 * LANES] = wp.dot(unit, corner)
+    rows[row + 7 * LANES] = (beside_u - wp.dot(along_u, corner)) / widening
+    rows[row + 11 * LANES] = (beside_v - wp.dot(along_v, corner)) / widening
+    rows[row + 12 * LANES] = wp.cast(piece.triangle, wp.float32)
+
+
+@launch.kernel
+def fill_cells(
+    first: int,
+    # In:
+    target: GridTarget,
+    items: wp.array(dtype=wp.int32),  # in the order of their subcells
+    start: wp.array(dtype=wp.int32),
+    cell: wp.array(dtype=wp.int32),
+    node: wp.array(dtype=wp.int32),
+    row: wp.array(dtype=wp.int32),
+    # Out:
+    boxes_out: wp.array(dtype=wp.float32),
+    rows_out: wp.array(dtype=wp.float32),
+):
+    occupied = first + wp.tid()
+    number = cell[occupied]
+    nx, ny = target.cells[0], target.cells[1]
+    corner = wp.vec3(float(number % nx), float((number / nx) % ny), float(number / (nx * ny)))
+    for which in range(2):
+        begin = int(start[SUBCELLS * (2 * occupied + which)])
+        end = int(start[SUBCELLS * (2 * occupied + which + 1)])
+        first_node, end_node = int(node[2 * number + which]), int(node[2 * number + which + 1])
+        height = wp.where(which == 0, PATCH_ROWS, TRIANGLE_ROWS)
+        for block in range(LANES * (end_node - first_node)):
+            at = LANES * (row[2 * number + which] + height * block)
+            low, high = wp.vec3(EMPTY), wp.vec3(-EMPTY)
+            for lane in range(LANES):
+                i = begin + LANES * block + lane
+                if i < end:
+                    piece = piece_of(target, items[i])
+                    low = wp.min(low, low_corner(piece))
+                    high = wp.max(high, high_corner(piece))
+                    if which == 0:
+                        write_patch(piece, corner, at + lane, rows_out)
+                    else:
+                        write_triangle(target, piece, corner, at + lane, rows_out)
+                elif begin + LANES * block < end:
+                    for k in range(height):
+                        rows_out[at + k * LANES + lane] = 0.0
+            # What lies outside the cell is another's.
+            low = wp.max(low - corner, wp.vec3(0.0)) - wp.vec3(CELL_MARGIN)
+            high = wp.min(high - corner, wp.vec3(1.0)) + wp.vec3(CELL_MARGIN)
+            side = LANES * SIDES * (first_node + block / LANES) + block % LANES
+            for axis in range(3):
+                boxes_out[side + 2 * axis * LANES] = low[axis]
+                boxes_out[side + (2 * axis + 1) * LANES] = high[axis]
 
 
 def build_grid(geometry: DeviceMesh, resolution: int, quality: Quality, *, trusted: bool = False) -> Grid:
@@ -433,105 +490,88 @@ def build_grid(geometry: DeviceMesh, resolution: int, quality: Quality, *, trust
     triangles = len(geometry.faces)
     if quality != "exact" and triangles > (FEWEST_TRIANGLES if trusted else FEW_TRIANGLES):
         frame = texel_frame(geometry.mesh, max(1, round(resolution / PATCH_TEXELS[quality])))
-        cells = FAST_GRID_CELLS if quality == "fast" else GRID_CELLS
-        if trusted:
-            cells = min(cells, int(BRICK) * max(2, round(CELLS_PER_TEXEL * max(frame.size) / int(BRICK))))
-        target, ratio = _target(geometry, frame, cells)
-        survey = Survey(geometry, frame, ratio, target.bricks)
+        survey = Survey(geometry, frame, max(1, min(SURVEY_CELLS, round(SURVEY_CELLS_PER_PATCH * max(frame.size)))))
         if survey.small > DENSE * survey.count * PATCH_TEXELS[quality] ** 2:
-            if trusted:
-                return _of_patches(target, survey, no_doubts(survey.patches()[0], target.bricks), geometry)
-            doubts = doubts_of(frame, ratio, target.bricks, *survey.patches(), LARGEST_TURN[quality])
+            doubts = no_doubts(survey) if trusted else doubts_of(survey, LARGEST_TURN[quality])
             if doubts.share < DOUBTFUL:
-                return _of_patches(target, survey, doubts, geometry)
-    cells = DENSE_GRID_CELLS if triangles > DENSE_TRIANGLES else GRID_CELLS
-    target, _ = _target(geometry, texel_frame(geometry.mesh, resolution), cells)
-    cell, item, _ = _cells_of(target, None, triangles, geometry.vertices.device)
-    return Grid(_built(target, geometry, cell, item), cell.shape[0], False)
+                return _of_patches(geometry, survey, doubts)
+    target, _ = _target(geometry, texel_frame(geometry.mesh, resolution), triangles)
+    every = wp.empty(0, dtype=wp.int32, device=geometry.vertices.device)
+    view, records = _built(target, geometry, every, triangles)
+    return Grid(view, records, False)
 
 
-def _of_patches(target: Any, survey: Survey, doubts: Doubts, geometry: DeviceMesh) -> Grid:
+def _of_patches(geometry: DeviceMesh, survey: Survey, doubts: Doubts) -> Grid:
     """Patches, and the triangles that none stands for."""
-    target.patches, target.doubtful = doubts.patches, doubts.cells
-    cell, item = _patches_and_the_rest(target, survey, doubts.near)
-    view = _built(target, geometry, cell, item)
-    view.front = float(survey.front)
-    view.low, view.high = view.low - PATCH_RISE, view.high + PATCH_RISE
-    return Grid(view, cell.shape[0], True)
+    patches, touched = doubts.sure_patches()
+    items = _joined(patches, survey.kept_triangles(touched, doubts.near))
+    target, cells_per_texel = _target(geometry, survey.frame, items.shape[0])
+    target.patches, target.cells_per_survey_cell = doubts.patches, cells_per_texel / survey.cells_per_texel
+    view, records = _built(target, geometry, items, items.shape[0])
+    view.front, view.horizon = float(survey.front), HORIZON * cells_per_texel
+    view.half_patch = (0.5 + PATCH_MARGIN) * cells_per_texel
+    rise = wp.vec3(PATCH_RISE * cells_per_texel)
+    view.low, view.high = view.low - rise, view.high + rise
+    return Grid(view, records, True)
 
 
-def _target(geometry: DeviceMesh, frame: TexelFrame, cells: int) -> tuple[Any, float]:
-    """The cells over a frame, and how many make a texel."""
+def _target(geometry: DeviceMesh, frame: TexelFrame, items: int) -> tuple[Any, float]:
+    """The cells over a frame for so many items, and how many make a texel."""
+    cells = min(max(round(CELLS_PER_ROOT * math.sqrt(items)), FEWEST_CELLS), MOST_CELLS)
+    ratio = cells / max(frame.size)
     target = GridTarget()
     target.vertices, target.faces = geometry.vertices, geometry.faces
-    ratio = cells / max(frame.size)
     target.cells_per_unit = ratio * frame.scale
     target.cell_offset = wp.vec3(*(ratio * np.array(frame.offset)))
-    target.bricks = wp.vec3i(*(max(1, int(np.ceil(side * ratio / int(BRICK) - 1e-6))) for side in frame.size))
+    target.cells = wp.vec3i(*frame.cells(cells))
     return target, ratio
 
 
-def _cells_of(
-    target: Any, items: wp.array | None, count: int, device: wp.Device
-) -> tuple[wp.array, wp.array, wp.array]:
-    """(cell, item) of every pair that touches, and (cells,) uint8, 1 for cells touched; of the items listed, or else of
-    all patches, or of all triangles where there are none."""
-    listed = wp.empty(0, dtype=wp.int32, device=device) if items is None else items
-    counts = wp.zeros(count + 1, dtype=wp.int32, device=device)
-    masks = wp.empty(count, dtype=wp.uint64, device=device)
-    launch.launch(find_cells, count, [target, listed, counts, masks], device)
-    places, total = exclusive_scan(counts)
-    cell, item = (wp.empty(total, dtype=wp.int32, device=device) for _ in range(2))
-    touched = wp.zeros(_brick_count(target) * int(CELLS), dtype=wp.uint8, device=device)
-    launch.launch(list_cells, count, [target, listed, masks, places, cell, item, touched], device)
-    return cell, item, touched
-
-
-def _brick_count(target: Any) -> int:
-    return target.bricks[0] * target.bricks[1] * target.bricks[2]
-
-
-def _patches_and_the_rest(target: Any, survey: Survey, near_doubt: wp.array) -> tuple[wp.array, wp.array]:
-    """(cell, item) of all patches, and of the triangles that no patch stands for."""
-    device = target.patches.device
-    cell, item, touched = _cells_of(target, None, survey.count, device)
-    kept = survey.kept_triangles(touched, near_doubt)
-    if kept.shape[0] == 0:
-        return cell, item
-    more_cells, more_items, _ = _cells_of(target, kept, kept.shape[0], device)
-    return _joined(cell, more_cells), _joined(item, more_items)
-
-
 def _joined(a: wp.array, b: wp.array) -> wp.array:
+    if b.shape[0] == 0:
+        return a
     both = wp.empty(a.shape[0] + b.shape[0], dtype=a.dtype, device=a.device)
     wp.copy(both, a)
     wp.copy(both, b, dest_offset=a.shape[0])
     return both
 
 
-def _built(target: Any, geometry: DeviceMesh, cell: wp.array, item: wp.array) -> Any:
-    device = cell.device
-    bricks = _brick_count(target)
-    start, places = bin_items(cell, bricks * int(CELLS), device)
-    occupied, blocks = (wp.zeros(bricks + 1, dtype=wp.int32, device=device) for _ in range(2))
-    launch.launch(find_occupied_bricks, bricks, [start, occupied, blocks], device)
-    number, occupied_count = exclusive_scan(occupied)
-    first_block, block_count = exclusive_scan(blocks)
+def _built(target: Any, geometry: DeviceMesh, items: wp.array, count: int) -> tuple[Any, int]:
+    """The grid of ``count`` items, those listed or else all triangles, and its records."""
+    device = geometry.vertices.device
+    cells = target.cells[0] * target.cells[1] * target.cells[2]
     view = GridView()
-    view.brick = wp.empty(bricks, dtype=wp.int32, device=device)
-    view.mask = wp.empty(max(occupied_count, 1), dtype=wp.uint64, device=device)
-    view.block = wp.zeros(occupied_count * int(CELLS) + 1, dtype=wp.int32, device=device)
-    view.rows = wp.empty(block_count * int(LANES) * int(ROWS), dtype=wp.float32, device=device)
-    inputs = [start, number, first_block, view.brick, view.mask, view.block, view.rows]
-    launch.launch(lay_out_bricks, bricks, inputs, device)
-    view.leaps = wp.empty(8 * bricks, dtype=wp.uint8, device=device)
-    launch.launch(find_leaps, 8, [view.brick, target.bricks, view.leaps], device)
-    view.triangle = wp.empty(block_count * int(LANES), dtype=wp.int32, device=device)
-    inputs = [target, cell, item, places, start, number, view.block, view.rows, view.triangle]
-    launch.launch(fill_records, cell.shape[0], inputs, device)
+
+    # Find the pairs of cell and item.
+    counts, touched = (wp.zeros(n + 1, dtype=wp.int32, device=device) for n in (count, cells))
+    masks = wp.empty(count, dtype=wp.uint64, device=device)
+    launch.launch(find_cells, count, [target, items, counts, masks, touched], device)
+    places, records = exclusive_scan(counts)
+    number, occupied = exclusive_scan(touched)
+    part, item = (wp.empty(records, dtype=wp.int32, device=device) for _ in range(2))
+    launch.launch(list_cells, count, [target, items, masks, places, number, part, item], device)
+
+    # Sort them by cell, and by where they lie in it.
+    start, places = bin_items(part, 2 * occupied * int(SUBCELLS), device)
+    ordered = wp.empty_like(item)
+    launch.launch(put_in_order, records, [item, places, ordered], device)
+
+    # Lay out blocks of records, and the boxes about them.
+    cell = wp.empty(occupied, dtype=wp.int32, device=device)
+    rows, nodes = (wp.zeros(2 * cells + 1, dtype=wp.int32, device=device) for _ in range(2))
+    launch.launch(measure_lists, cells, [start, number, cell, rows, nodes], device)
+    view.row, row_count = exclusive_scan(rows)
+    view.node, node_count = exclusive_scan(nodes)
+    view.boxes = wp.empty(node_count * int(LANES * SIDES), dtype=wp.float32, device=device)
+    view.rows = wp.empty(row_count * int(LANES), dtype=wp.float32, device=device)
+    inputs = [target, ordered, start, cell, view.node, view.row, view.boxes, view.rows]
+    launch.launch(fill_cells, occupied, inputs, device)
+    view.leaps = wp.empty(8 * cells, dtype=wp.uint8, device=device)
+    launch.launch(find_leaps, 8, [view.node, target.cells, view.leaps], device)
+
     centre, half = geometry.mesh.unit_frame
     low, high = ((bound - centre) / half * target.cells_per_unit + target.cell_offset for bound in geometry.mesh.bounds)
     view.low, view.high = wp.vec3(*low), wp.vec3(*high)
-    view.bricks, view.vertices, view.faces = target.bricks, geometry.vertices, geometry.faces
+    view.cells, view.vertices, view.faces = target.cells, geometry.vertices, geometry.faces
     view.cells_per_unit, view.cell_offset = target.cells_per_unit, target.cell_offset
-    return view
+    return view, records

@@ -1,93 +1,38 @@
 """Ray against occupancy grid (``grid.py``): ``march_exact``, a walk through the occupied cells, nearest first.
 
-Empty bricks are leapt over; the records of a cell are tested eight at a time; the first that is met is the answer.
+Empty cells are leapt over; of an occupied one the boxes about its blocks are tested eight at a time, and then the
+records of the blocks whose boxes the ray meets, eight at a time too. The nearest record met in a cell is the answer.
 ``search_grid`` sends a ray on that grazes the back of a closed object's patch.
 """
 
 from __future__ import annotations
 
+import re
+
 import warp as wp
 
-from ldtrefl.grid import BRICK, CELLS, LANES, ROWS, SMALL_PATCH, TRIANGLE, GridView
+from ldtrefl.grid import LARGE, PATCH_ROWS, TRIANGLE, TRIANGLE_ROWS, GridView
 from ldtrefl.shade import barycentrics_at, brought_inside
 from ldtrefl.trace import Hit, Tracer, no_hit
 
-CELL_SLACK = wp.constant(1.0e-4)
+CELL_SLACK = 1.0e-4
 """Cells by which cells overlap along the ray: ten roundings of a coordinate in a grid of 128."""
 
-EDGE_SLACK = wp.constant(1.0e-5)
+EDGE_SLACK = 1.0e-5
 """Barycentric units by which records are widened, so that no ray slips between two triangles that share an edge."""
 
-GRAZING = wp.constant(0.35)
+GRAZING = 0.35
 """n . direction below which a hit on the back of a closed object's patch is doubted, see ``search_grid``."""
 
-HORIZON = wp.constant(0.1)
-"""Cells after a doubted hit from where the search goes on: a third of a patch."""
-
-NEGLIGIBLE = wp.constant(1.0e-18)
+NEGLIGIBLE = 1.0e-18
 """Component of a unit direction below which the ray runs along the planes: it would cross a cell in 1e18 cells."""
 
-FAR = wp.constant(1.0e30)
+FAR = 1.0e30
 """The t of planes that are never reached."""
 
-PER_BRICK = wp.constant(0.25)
-"""Bricks in a cell."""
-
-
-MEET_BLOCKS = """
-    const int lanes = 8;
-    float nearest[lanes];
-    int where[lanes];
-    for (int i = 0; i < lanes; ++i) { nearest[i] = NO_HIT; where[i] = -1; }
-    for (int block = first_block; block < end_block; ++block) {
-        const float* r = rows.data + (size_t)block * (13 * lanes);
-        for (int i = 0; i < lanes; ++i) {
-            float slope = r[i] * dx + r[lanes + i] * dy + r[2 * lanes + i] * dz;
-            float height = r[3 * lanes + i] - (r[i] * ox + r[lanes + i] * oy + r[2 * lanes + i] * oz);
-            float t = height / slope;
-            float x = ox + t * dx, y = oy + t * dy, z = oz + t * dz;
-            float u = r[4 * lanes + i] * x + r[5 * lanes + i] * y + r[6 * lanes + i] * z + r[7 * lanes + i];
-            float v = r[8 * lanes + i] * x + r[9 * lanes + i] * y + r[10 * lanes + i] * z + r[11 * lanes + i];
-            bool inside = (t >= t_min) & (t <= t_max) & (u >= -slack) & (v >= -slack) & (u <= 1.0f + slack)
-                & (v <= 1.0f + slack) & (u + v <= r[12 * lanes + i] + slack) & (t < nearest[i])
-                & (slope * slope > EDGE_ON);
-            nearest[i] = inside ? t : nearest[i];
-            where[i] = inside ? block - first_block : where[i];
-        }
-    }
-    float t = NO_HIT;
-    for (int i = 0; i < lanes; ++i) t = nearest[i] < t ? nearest[i] : t;
-    int record = -1;
-    if (t < NO_HIT) {
-        for (int i = lanes - 1; i >= 0; --i) record = nearest[i] == t ? where[i] * lanes + i : record;
-    }
-    return wp::vec2(t, (float)record);
-""".replace("NO_HIT", "3.0e38f").replace("EDGE_ON", "4.0e-14f")
-
-
-@wp.func_native(MEET_BLOCKS)
-def meet_blocks(
-    rows: wp.array(dtype=wp.float32),
-    first_block: int,
-    end_block: int,
-    ox: float,
-    oy: float,
-    oz: float,
-    dx: float,
-    dy: float,
-    dz: float,
-    t_min: float,
-    t_max: float,
-    slack: float,
-) -> wp.vec2:
-    """(t, record counted from the first block's) of the nearest record that a ray meets from ``t_min`` to ``t_max``;
-    record -1 if none.
-
-    Written in C++ so that the eight lanes become one vector, and the blocks do not wait for each other: a Warp loop
-    tests records one by one, at three times the time. A record seen edge on, to float32's rounding of n . direction, is
-    not met: nothing is known of where.
-    """
-    ...
+EDGE_ON = 2.0e-7
+"""|n . direction| up to which a record is seen edge on, to float32's rounding, and is not met: nothing is known of
+where."""
 
 
 @wp.struct
@@ -95,294 +40,363 @@ class GridHit:
     """The record that a ray meets first."""
 
     t: float
-    fragment: int  # its place among the records, -1 for none
-    local: wp.vec3  # the point in the brick's coordinates
-    steps: int  # bricks entered and blocks tested
+    triangle: int  # -1 on a miss
+    steps: int  # cells looked at and blocks tested
+    kind: int
+    u: float  # a triangle's barycentrics
+    v: float
+    normal: wp.vec3  # unit
 
 
-@wp.struct
-class GridRay:
-    """A ray that has entered an object's box; t counts from the entry, which keeps far rays precise."""
+SEARCH_CELLS = """
+#if defined(__CUDA_ARCH__)
+    #define IN_LINE
+    #define OUT_OF_LINE
+#else
+    #pragma clang fp contract(fast)
+    #define IN_LINE __attribute__((always_inline))
+    #define OUT_OF_LINE __attribute__((noinline))
+#endif
+    using vec3 = wp::vec_t<3, float>;
+    struct Met { float t; int triangle, steps, kind; float u, v; vec3 normal; };
+    const int lanes = 8;
+    const auto* view = views.data + index;
+    auto lesser = [](float a, float b) { return a < b ? a : b; };
+    auto greater = [](float a, float b) { return a > b ? a : b; };
+    auto floored = [=](float x, float first, float last) { return greater(lesser((float)(int)x, last), first); };
 
-    entry: wp.vec3
-    direction: wp.vec3
-    inverse: wp.vec3  # 1 / direction, 0 along planes that the ray never crosses
-    never: wp.vec3  # added to a plane's t: far for those planes
-    forward: wp.vec3i  # 1 along axes that the ray goes up, 0 down
-    t_enter: float  # before the entry
-    t_end: float  # negative if the ray misses the box
+    auto as_int = [](float x) { union { float x; int i; } bits = {x}; return bits.i; };
+    auto as_float = [](int i) { union { int i; float x; } bits = {i}; return bits.x; };
+
+    // Eight flags, 0 or 1, as a word, and the number of the first that is set.
+    auto packed = [](const unsigned char* flags) {
+        unsigned long long word;
+        memcpy(&word, flags, 8);
+        return word;
+    };
+    auto lowest_byte = [](unsigned long long word) {
+#if defined(__CUDA_ARCH__)
+        return (__ffsll((long long)word) - 1) / 8;
+#else
+        return __builtin_ctzll(word) / 8;
+#endif
+    };
+
+    // Walk the occupied cells along a ray, nearest first; the nearest record of the first in which one is met is met.
+    auto march = [=](vec3 origin, vec3 direction, float t_max) IN_LINE -> Met {
+#if !defined(__CUDA_ARCH__)
+    #pragma clang fp contract(fast)
+#endif
+    const auto& grid = *view;
+    // Slab test against the object's box. Along planes that the ray never crosses inverse is 0, and never is far.
+    float inverse[3], never[3];
+    float t_enter = 0.0f, t_exit = t_max;
+    #pragma unroll
+    for (int k = 0; k < 3; ++k) {
+        const float low = grid.low[k] - CELL_SLACK, high = grid.high[k] + CELL_SLACK;
+        if (direction[k] < NEGLIGIBLE && direction[k] > -NEGLIGIBLE) {
+            inverse[k] = 0.0f;
+            never[k] = FAR;
+            if (origin[k] < low || origin[k] > high) t_exit = -1.0f;
+        } else {
+            inverse[k] = 1.0f / direction[k];
+            never[k] = 0.0f;
+            const float t_low = (low - origin[k]) * inverse[k], t_high = (high - origin[k]) * inverse[k];
+            t_enter = greater(lesser(t_low, t_high), t_enter);
+            t_exit = lesser(greater(t_low, t_high), t_exit);
+        }
+    }
+    if (!(t_enter <= t_exit)) return {INFINITY, -1, 0, TRIANGLE, 0.0f, 0.0f, vec3(0.0f)};
+
+    // From here on t counts from the entry, which keeps far rays precise. Places of cells are counted along the turned
+    // ray, every axis reversed that the ray goes down: the cell's number is ``first`` plus ``step`` times its place.
+    const float t_end = t_exit - t_enter;
+    float entry[3], turned_entry[3], turned_direction[3], turned_inverse[3], offset[3], side[3], place[3];
+    int step[3], near_side[3], far_side[3];
+    int first = 0, octant = 0, stride = 1;
+    #pragma unroll
+    for (int k = 0; k < 3; ++k) {
+        const bool up = direction[k] > 0.0f;
+        side[k] = (float)grid.cells[k];
+        entry[k] = origin[k] + t_enter * direction[k];
+        turned_entry[k] = up ? entry[k] : side[k] - entry[k];
+        turned_direction[k] = up ? direction[k] : -direction[k];
+        turned_inverse[k] = up ? inverse[k] : -inverse[k];
+        offset[k] = never[k] - turned_entry[k] * turned_inverse[k];
+        place[k] = floored(turned_entry[k], 0.0f, side[k] - 1.0f);
+        step[k] = up ? stride : -stride;
+        first += up ? 0 : (grid.cells[k] - 1) * stride;
+        octant += up ? 1 << k : 0;
+        stride *= grid.cells[k];
+        near_side[k] = lanes * (2 * k + (up ? 0 : 1));
+        far_side[k] = lanes * (2 * k + (up ? 1 : 0));
+    }
+    const unsigned char* leaps = grid.leaps.data + (size_t)octant * stride;
+    const float dx = direction[0], dy = direction[1], dz = direction[2];
+    int cell = first + (int)place[0] * step[0] + (int)place[1] * step[1] + (int)place[2] * step[2];
+    float t = 0.0f;
+    int steps = 0;
+    while (t <= t_end) {
+        const bool is_occupied = leaps[cell] == 0;
+        const float leap = is_occupied ? 1.0f : (float)leaps[cell];
+        ++steps;
+
+        // The cube of ``leap`` cells ahead is left through the nearest of its far sides.
+        const float tx = (place[0] + leap) * turned_inverse[0] + offset[0];
+        const float ty = (place[1] + leap) * turned_inverse[1] + offset[1];
+        const float tz = (place[2] + leap) * turned_inverse[2] + offset[2];
+        const float t_out = greater(lesser(lesser(tx, ty), tz), t);
+
+        if (is_occupied) {
+            // In coordinates from the cell's corner, t from where the ray enters it.
+            float local[3];
+            #pragma unroll
+            for (int k = 0; k < 3; ++k) {
+                const float corner = direction[k] > 0.0f ? place[k] : side[k] - 1.0f - place[k];
+                local[k] = entry[k] + t * direction[k] - corner;
+            }
+            const float ox = local[0], oy = local[1], oz = local[2];
+            const float from = greater(-CELL_SLACK, -t), to = lesser(t_out, t_end) - t + CELL_SLACK;
+            // Slab test against the boxes of a node's eight blocks: a flag for each.
+            auto entered = [=](int node) {
+                const float* box = grid.boxes.data + (size_t)node * (6 * lanes);
+                unsigned char flags[lanes];
+                for (int i = 0; i < lanes; ++i) {
+                    const float in_x = (box[near_side[0] + i] - ox) * inverse[0] - never[0];
+                    const float in_y = (box[near_side[1] + i] - oy) * inverse[1] - never[1];
+                    const float in_z = (box[near_side[2] + i] - oz) * inverse[2] - never[2];
+                    const float out_x = (box[far_side[0] + i] - ox) * inverse[0] + never[0];
+                    const float out_y = (box[far_side[1] + i] - oy) * inverse[1] + never[1];
+                    const float out_z = (box[far_side[2] + i] - oz) * inverse[2] + never[2];
+                    const float in = greater(greater(in_x, in_y), greater(in_z, from));
+                    const float out = lesser(lesser(out_x, out_y), lesser(out_z, to));
+                    flags[i] = in <= out ? 1 : 0;
+                }
+                return packed(flags);
+            };
+
+            // The t of the eight planes of a block; none is that of one seen edge on.
+            auto plane = [=](const float* r, int i) {
+                const float slope = r[i] * dx + r[lanes + i] * dy + r[2 * lanes + i] * dz;
+                const float height = r[3 * lanes + i] - (r[i] * ox + r[lanes + i] * oy + r[2 * lanes + i] * oz);
+                return height / (slope * slope > EDGE_ON * EDGE_ON ? slope : 0.0f);
+            };
+
+            // Of each lane what is nearest: its t, and the row of its block.
+            const float* rows = grid.rows.data;
+            float nearest[lanes];
+            int where[lanes];
+            for (int i = 0; i < lanes; ++i) nearest[i] = to;
+            const int* node = grid.node.data + 2 * cell;
+            const int* row = grid.row.data + 2 * cell;
+            for (int n = node[0]; n < node[1]; ++n) {
+                for (unsigned long long left = entered(n); left; left &= left - 1) {
+                    const int at = row[0] + PATCH_ROWS * (lanes * (n - node[0]) + lowest_byte(left));
+                    const float* r = rows + (size_t)at * lanes;
+                    ++steps;
+                    for (int i = 0; i < lanes; ++i) {
+                        const float s = plane(r, i);
+                        const float x = ox + s * dx, y = oy + s * dy, z = oz + s * dz;
+                        const int axis = as_int(r[7 * lanes + i]) & 3;
+                        const float u = (axis == 0 ? y : axis == 1 ? z : x) - r[4 * lanes + i];
+                        const float v = (axis == 0 ? z : axis == 1 ? x : y) - r[5 * lanes + i];
+                        const bool is_met = (greater(wp::abs(u), wp::abs(v)) <= grid.half_patch) & (s >= from)
+                            & (s < nearest[i]);
+                        nearest[i] = is_met ? s : nearest[i];
+                        where[i] = is_met ? at : where[i];
+                    }
+                }
+            }
+            for (int n = node[1]; n < node[2]; ++n) {
+                for (unsigned long long left = entered(n); left; left &= left - 1) {
+                    const int at = row[1] + TRIANGLE_ROWS * (lanes * (n - node[1]) + lowest_byte(left));
+                    const float* r = rows + (size_t)at * lanes;
+                    ++steps;
+                    for (int i = 0; i < lanes; ++i) {
+                        const float s = plane(r, i);
+                        const float x = ox + s * dx, y = oy + s * dy, z = oz + s * dz;
+                        const float u = r[4 * lanes + i] * x + r[5 * lanes + i] * y + r[6 * lanes + i] * z
+                            + r[7 * lanes + i];
+                        const float v = r[8 * lanes + i] * x + r[9 * lanes + i] * y + r[10 * lanes + i] * z
+                            + r[11 * lanes + i];
+                        const float within = lesser(lesser(u, v), 1.0f - (u + v));
+                        const bool is_met = (within >= -EDGE_SLACK) & (s >= from) & (s < nearest[i]);
+                        nearest[i] = is_met ? s : nearest[i];
+                        where[i] = is_met ? at : where[i];
+                    }
+                }
+            }
+
+            unsigned char is_met[lanes];
+            for (int i = 0; i < lanes; ++i) is_met[i] = nearest[i] < to ? 1 : 0;
+            unsigned long long left = packed(is_met);
+            if (left) {
+                int lane = lowest_byte(left);
+                for (left &= left - 1; left; left &= left - 1) {
+                    const int other = lowest_byte(left);
+                    lane = nearest[other] < nearest[lane] ? other : lane;
+                }
+                const float s = nearest[lane];
+                const float* r = rows + (size_t)where[lane] * lanes + lane;
+                const vec3 normal(r[0], r[lanes], r[2 * lanes]);
+                const float t_met = greater(t_enter + (t + s), 0.0f);
+                if (where[lane] < row[1]) {
+                    const int triangle = as_int(r[6 * lanes]), kind = as_int(r[7 * lanes]);
+                    return {t_met, triangle, steps, kind, 0.0f, 0.0f, normal};
+                }
+                const float x = ox + s * dx, y = oy + s * dy, z = oz + s * dz;
+                const float u = r[4 * lanes] * x + r[5 * lanes] * y + r[6 * lanes] * z + r[7 * lanes];
+                const float v = r[8 * lanes] * x + r[9 * lanes] * y + r[10 * lanes] * z + r[11 * lanes];
+                return {t_met, as_int(r[12 * lanes]), steps, TRIANGLE, u, v, normal};
+            }
+        }
+
+        // Go on where the ray leaves the cube.
+        t = t_out;
+        const int axis = tx <= ty && tx <= tz ? 0 : ty <= tz ? 1 : 2;
+        if (leap == 1.0f) {
+            if (axis == 0) {
+                place[0] += 1.0f;
+                cell += step[0];
+                if (place[0] >= side[0]) break;
+            } else if (axis == 1) {
+                place[1] += 1.0f;
+                cell += step[1];
+                if (place[1] >= side[1]) break;
+            } else {
+                place[2] += 1.0f;
+                cell += step[2];
+                if (place[2] >= side[2]) break;
+            }
+        } else {
+            // Beside the axis of that side, in the cell that the ray is in then.
+            cell = first;
+            #pragma unroll
+            for (int k = 0; k < 3; ++k) {
+                const float last = lesser(place[k] + leap, side[k]) - 1.0f;
+                const float beside = floored(turned_entry[k] + t * turned_direction[k], place[k], last);
+                place[k] = k == axis ? place[k] + leap : beside;
+                cell += (int)place[k] * step[k];
+            }
+            if (place[0] >= side[0] || place[1] >= side[1] || place[2] >= side[2]) break;
+        }
+    }
+    return {INFINITY, -1, steps, TRIANGLE, 0.0f, 0.0f, vec3(0.0f)};
+    };
+
+    // From outside a closed object only the front of its surface is seen. A ray that grazes a back is in doubt: it has
+    // either passed just over the horizon, where the next patch sticks out by its margin, or it started inside.
+    auto facing = [=](const Met& met, const vec3& way) {
+        return view->front * (met.normal[0] * way[0] + met.normal[1] * way[1] + met.normal[2] * way[2]);
+    };
+    auto is_doubted = [=](const Met& met) {
+        const float back = facing(met, direction);
+        return back > 0.0f && back < GRAZING;
+    };
+
+    Met met = march(origin, direction, t_max);
+    if (is_doubted(met)) {
+        // If it started inside, any other ray from there meets a back too: one is sent to see. If not, it goes on. That
+        // is rare, and stays out of the way of what is not.
+        auto beyond = [=](Met met) OUT_OF_LINE -> Met {
+            vec3 start = origin;
+            int steps = met.steps;
+            while (is_doubted(met)) {
+                const vec3 aside = wp::normalize(wp::cross(direction, met.normal));
+                const Met probe = march(start, aside, FAR);
+                steps += probe.steps;
+                if (facing(probe, aside) > 0.0f) break;
+                const float passed = met.t + view->horizon;
+                start = origin + passed * direction;
+                met = march(start, direction, t_max - passed);
+                met.t += passed;
+                steps += met.steps;
+            }
+            met.steps = steps;
+            return met;
+        };
+        met = beyond(met);
+    }
+    return {met.t, as_float(met.triangle), as_float(met.steps), as_float(met.kind), met.u, met.v,
+        met.normal[0], met.normal[1], met.normal[2]};
+"""
 
 
-@wp.func
-def enter_grid(
+def _with_constants(snippet: str) -> str:
+    """The snippet with the values of this file's names in their place."""
+    for name, number in {"PATCH_ROWS": PATCH_ROWS, "TRIANGLE_ROWS": TRIANGLE_ROWS, "TRIANGLE": TRIANGLE}.items():
+        snippet = re.sub(rf"\b{name}\b", str(int(number)), snippet)
+    for name, value in {
+        "CELL_SLACK": CELL_SLACK,
+        "EDGE_SLACK": EDGE_SLACK,
+        "EDGE_ON": EDGE_ON,
+        "NEGLIGIBLE": NEGLIGIBLE,
+        "GRAZING": GRAZING,
+        "FAR": FAR,
+    }.items():
+        snippet = re.sub(rf"\b{name}\b", f"{value:.9e}f", snippet)
+    return snippet
+
+
+@wp.func_native(_with_constants(SEARCH_CELLS))
+def search_cells(
     views: wp.array(dtype=GridView), index: int, origin: wp.vec3, direction: wp.vec3, t_max: float
-) -> GridRay:
-    """Slab test against an object's box, cell space."""
-    ray = GridRay()
-    t_enter = float(0.0)
-    t_exit = t_max
-    inverse = wp.vec3(0.0)
-    never = wp.vec3(0.0)
-    for axis in range(3):
-        low, high = views[index].low[axis] - CELL_SLACK, views[index].high[axis] + CELL_SLACK
-        if wp.abs(direction[axis]) < NEGLIGIBLE:
-            never[axis] = FAR
-            if origin[axis] < low or origin[axis] > high:
-                t_exit = -1.0
-        else:
-            inverse[axis] = 1.0 / direction[axis]
-            t_low, t_high = (low - origin[axis]) * inverse[axis], (high - origin[axis]) * inverse[axis]
-            t_enter = wp.max(t_enter, wp.min(t_low, t_high))
-            t_exit = wp.min(t_exit, wp.max(t_low, t_high))
-    if not t_enter <= t_exit:
-        ray.t_end = -1.0
-        return ray
-    ray.t_enter = t_enter
-    ray.t_end = t_exit - t_enter
-    ray.entry = origin + t_enter * direction
-    ray.direction = direction
-    ray.inverse = inverse
-    ray.never = never
-    ray.forward = wp.vec3i(
-        wp.where(direction[0] > 0.0, 1, 0), wp.where(direction[1] > 0.0, 1, 0), wp.where(direction[2] > 0.0, 1, 0)
-    )
-    return ray
+) -> wp.mat33:
+    """:func:`march_exact`: the bits of a ``GridHit``, in the order of its fields.
 
-
-@wp.func
-def walk_brick(
-    views: wp.array(dtype=GridView), index: int, ray: GridRay, number: int, local: wp.vec3, t: float
-) -> GridHit:
-    """Walk the cells of an occupied brick, in its own coordinates, from ``local``, where the ray enters it at ``t``.
-
-    The hit's t counts from there.
+    In C++ so that eight lanes become one vector: a Warp loop tests records one by one, at three times the time.
     """
-    found = GridHit()
-    found.fragment = -1
-    fx, fy, fz = ray.forward[0], ray.forward[1], ray.forward[2]
-    ix, iy, iz = ray.inverse[0], ray.inverse[1], ray.inverse[2]
-    ux, uy, uz = ray.never[0], ray.never[1], ray.never[2]
-    mask = views[index].mask[number]
-    cx, cy, cz = wp.clamp(int(local[0]), 0, 3), wp.clamp(int(local[1]), 0, 3), wp.clamp(int(local[2]), 0, 3)
-    tx = (float(cx + fx) - local[0]) * ix + ux
-    ty = (float(cy + fy) - local[1]) * iy + uy
-    tz = (float(cz + fz) - local[2]) * iz + uz
-    t_in = float(0.0)
-    inside = bool(True)
-    while inside:
-        cell = (cz * BRICK + cy) * BRICK + cx
-        t_out = wp.min(tx, wp.min(ty, tz))
-        if ((mask >> wp.uint64(cell)) & wp.uint64(1)) != wp.uint64(0):
-            first_block = views[index].block[CELLS * number + cell]
-            end_block = views[index].block[CELLS * number + cell + 1]
-            hit = meet_blocks(
-                views[index].rows,
-                first_block,
-                end_block,
-                local[0],
-                local[1],
-                local[2],
-                ray.direction[0],
-                ray.direction[1],
-                ray.direction[2],
-                wp.max(t_in - CELL_SLACK, -t),
-                wp.min(t_out + CELL_SLACK, ray.t_end - t),
-                EDGE_SLACK,
-            )
-            found.steps += end_block - first_block
-            if hit[1] >= 0.0:
-                found.fragment = LANES * first_block + int(hit[1])
-                found.t = hit[0]
-                found.local = local + hit[0] * ray.direction
-                return found
-        t_in = t_out
-        if tx <= ty and tx <= tz:
-            cx += 2 * fx - 1
-            inside = cx >= 0 and cx <= 3
-            tx = (float(cx + fx) - local[0]) * ix + ux
-        elif ty <= tz:
-            cy += 2 * fy - 1
-            inside = cy >= 0 and cy <= 3
-            ty = (float(cy + fy) - local[1]) * iy + uy
-        else:
-            cz += 2 * fz - 1
-            inside = cz >= 0 and cz <= 3
-            tz = (float(cz + fz) - local[2]) * iz + uz
-    return found
-
-
-@wp.func
-def side_of_leap(ray: GridRay, axis: int, brick: int, leap: int) -> float:
-    """The t at which a ray leaves, along an axis, the cube of ``leap`` bricks that begins with ``brick``."""
-    side = wp.where(ray.forward[axis] == 1, brick + leap, brick - leap + 1)
-    return (float(BRICK * side) - ray.entry[axis]) * ray.inverse[axis] + ray.never[axis]
-
-
-@wp.func
-def index_beside(ray: GridRay, axis: int, brick: int, leap: int, t: float, bricks: int) -> int:
-    """A brick's index at ``t`` along an axis other than the one that the cube of ``leap`` bricks is left along: brought
-    into the cube, and into the grid, whatever the rounding."""
-    if leap == 1:
-        return brick
-    index = int((ray.entry[axis] + t * ray.direction[axis]) * PER_BRICK)
-    if ray.forward[axis] == 1:
-        return wp.clamp(index, brick, wp.min(brick + leap, bricks) - 1)
-    return wp.clamp(index, wp.max(brick - leap + 1, 0), brick)
+    ...
 
 
 @wp.func
 def march_exact(
     views: wp.array(dtype=GridView), index: int, origin: wp.vec3, direction: wp.vec3, t_max: float
 ) -> GridHit:
-    """Walk the occupied cells along a ray, nearest first; the first record met is the answer.
+    """What a ray meets first: walk the occupied cells, nearest first, and over the horizon where patches stick out past
+    it.
 
-    Object ``index``, cell space, ``direction`` of unit length. All indices are stepped as integers and every plane's t
-    is computed from its index, so nothing adds up and nothing stalls.
+    Object ``index``, cell space, ``direction`` of unit length. Places are stepped as integers and every plane's t is
+    computed from its place, so nothing adds up and nothing stalls.
     """
-    nothing = GridHit()
-    nothing.t = float(wp.inf)
-    nothing.fragment = -1
-    ray = enter_grid(views, index, origin, direction, t_max)
-    if ray.t_end < 0.0:
-        return nothing
-    steps = int(0)
-    nx, ny, nz = views[index].bricks[0], views[index].bricks[1], views[index].bricks[2]
-    octant = (ray.forward[0] + 2 * ray.forward[1] + 4 * ray.forward[2]) * nx * ny * nz
-    bx = wp.clamp(int(ray.entry[0] * PER_BRICK), 0, nx - 1)
-    by = wp.clamp(int(ray.entry[1] * PER_BRICK), 0, ny - 1)
-    bz = wp.clamp(int(ray.entry[2] * PER_BRICK), 0, nz - 1)
-    t = float(0.0)
-    inside = bool(True)
-    while inside and t <= ray.t_end:
-        brick = (bz * ny + by) * nx + bx
-        leap = int(views[index].leaps[octant + brick])
-        steps += 1
-        if leap == 0:
-            leap = 1
-            local = ray.entry + t * direction - float(BRICK) * wp.vec3(float(bx), float(by), float(bz))
-            found = walk_brick(views, index, ray, views[index].brick[brick], local, t)
-            steps += found.steps
-            if found.fragment >= 0:
-                found.t = wp.max(ray.t_enter + (t + found.t), 0.0)
-                found.steps = steps
-                return found
-        # Leave the cube of ``leap`` bricks ahead through the nearest of its far sides.
-        tx, ty, tz = side_of_leap(ray, 0, bx, leap), side_of_leap(ray, 1, by, leap), side_of_leap(ray, 2, bz, leap)
-        t = wp.max(t, wp.min(tx, wp.min(ty, tz)))
-        if tx <= ty and tx <= tz:
-            by = index_beside(ray, 1, by, leap, t, ny)
-            bz = index_beside(ray, 2, bz, leap, t, nz)
-            bx += (2 * ray.forward[0] - 1) * leap
-            inside = bx >= 0 and bx < nx
-        elif ty <= tz:
-            bx = index_beside(ray, 0, bx, leap, t, nx)
-            bz = index_beside(ray, 2, bz, leap, t, nz)
-            by += (2 * ray.forward[1] - 1) * leap
-            inside = by >= 0 and by < ny
-        else:
-            bx = index_beside(ray, 0, bx, leap, t, nx)
-            by = index_beside(ray, 1, by, leap, t, ny)
-            bz += (2 * ray.forward[2] - 1) * leap
-            inside = bz >= 0 and bz < nz
-    nothing.steps = steps
-    return nothing
+    bits = search_cells(views, index, origin, direction, t_max)
+    found = GridHit()
+    found.t = bits[0, 0]
+    found.triangle = wp.cast(bits[0, 1], wp.int32)
+    found.steps = wp.cast(bits[0, 2], wp.int32)
+    found.kind = wp.cast(bits[1, 0], wp.int32)
+    found.u = bits[1, 1]
+    found.v = bits[1, 2]
+    found.normal = wp.vec3(bits[2, 0], bits[2, 1], bits[2, 2])
+    return found
 
 
 @wp.func
 def record_coordinates(views: wp.array(dtype=GridView), index: int, found: GridHit, point: wp.vec3) -> wp.vec2:
-    """Barycentrics of a hit: a triangle's record, still in the cache, knows them."""
-    block, lane = found.fragment / LANES, found.fragment % LANES
-    row = LANES * ROWS * block + lane
-    kind = views[index].rows[row + 12 * LANES]
-    if kind == SMALL_PATCH:
+    """Barycentrics of a hit in its triangle; -1 if that is one of many under a patch."""
+    if found.kind == TRIANGLE:
+        return brought_inside(found.u, found.v)
+    if found.kind < LARGE:
         return wp.vec2(-1.0, -1.0)
-    if kind == TRIANGLE:
-        p = found.local
-        u = (
-            views[index].rows[row + 4 * LANES] * p[0]
-            + views[index].rows[row + 5 * LANES] * p[1]
-            + views[index].rows[row + 6 * LANES] * p[2]
-        )
-        v = (
-            views[index].rows[row + 8 * LANES] * p[0]
-            + views[index].rows[row + 9 * LANES] * p[1]
-            + views[index].rows[row + 10 * LANES] * p[2]
-        )
-        return brought_inside(u + views[index].rows[row + 7 * LANES], v + views[index].rows[row + 11 * LANES])
-    corners = views[index].faces[views[index].triangle[found.fragment]]
+    corners = views[index].faces[found.triangle]
     return barycentrics_at(
         views[index].vertices[corners[0]], views[index].vertices[corners[1]], views[index].vertices[corners[2]], point
     )
 
 
 @wp.func
-def record_normal(views: wp.array(dtype=GridView), index: int, fragment: int) -> wp.vec3:
-    """Unit normal of a record."""
-    row = LANES * ROWS * (fragment / LANES) + fragment % LANES
-    return wp.vec3(views[index].rows[row], views[index].rows[row + LANES], views[index].rows[row + 2 * LANES])
-
-
-@wp.func
-def facing(views: wp.array(dtype=GridView), index: int, direction: wp.vec3, found: GridHit) -> float:
-    """n . direction, the normal n pointing out of a closed object; 0 on a miss, or if the object is not closed."""
-    if found.fragment < 0:
-        return 0.0
-    return views[index].front * wp.dot(record_normal(views, index, found.fragment), direction)
-
-
-@wp.func
-def search_grid(
-    views: wp.array(dtype=GridView), index: int, origin: wp.vec3, direction: wp.vec3, t_max: float
-) -> GridHit:
-    """:func:`march_exact`, over the horizon where patches stick out past it.
-
-    From outside a closed object only the front of its surface is seen. A ray that grazes a back has either passed just
-    over the horizon, where the next patch sticks out by its margin, and goes on; or it started inside. Then any other
-    ray from there meets a back too: one is sent to see.
-    """
-    found = GridHit()
-    start, way, limit = origin, direction, t_max
-    passed = float(0.0)
-    steps = int(0)
-    probing = bool(False)
-    searching = bool(True)
-    while searching:
-        searching = False
-        met = march_exact(views, index, start, way, limit)
-        steps += met.steps
-        back = facing(views, index, way, met)
-        if not probing:
-            found = met
-            found.t += passed
-            if back > 0.0 and back < GRAZING:
-                probing = True
-                way = wp.normalize(wp.cross(direction, record_normal(views, index, met.fragment)))
-                limit = FAR
-                searching = True
-        elif back <= 0.0:
-            probing = False
-            passed = found.t + HORIZON
-            start = origin + passed * direction
-            way = direction
-            limit = t_max - passed
-            searching = True
-    found.steps = steps
-    return found
-
-
-@wp.func
 def closest_hit_exact(
     views: wp.array(dtype=GridView), index: int, origin: wp.vec3, direction: wp.vec3, t_max: float
 ) -> Hit:
-    """The tracer's ``closest_hit`` by :func:`search_grid`."""
+    """The tracer's ``closest_hit`` by :func:`march_exact`."""
     scale = views[index].cells_per_unit
     hit = no_hit()
-    found = search_grid(views, index, scale * origin + views[index].cell_offset, direction, scale * t_max)
+    found = march_exact(views, index, scale * origin + views[index].cell_offset, direction, scale * t_max)
     hit.steps = found.steps
-    if found.fragment >= 0:
+    if found.triangle >= 0:
         hit.t = found.t / scale
-        hit.triangle = views[index].triangle[found.fragment]
-        hit.normal = record_normal(views, index, found.fragment)
+        hit.triangle = found.triangle
+        hit.normal = found.normal
         uv = record_coordinates(views, index, found, origin + hit.t * direction)
         hit.u = uv[0]
         hit.v = uv[1]

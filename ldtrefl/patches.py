@@ -17,7 +17,7 @@ import warp as wp
 from ldtrefl.binning import CHUNK, chunk_count, exclusive_scan, gather_lists, launch_chunks
 from ldtrefl.cubemap import TexelFrame, point_from_texel
 from ldtrefl.device_scene import DeviceMesh
-from ldtrefl.grid import BRICK, LARGE_PATCH, SMALL_PATCH, cell_number, number_of_cell
+from ldtrefl.grid import LARGE, cell_number, number_of_cell
 from ldtrefl.launch import kernel
 from ldtrefl.peel import snapped_vertices
 from ldtrefl.raster import (
@@ -38,7 +38,7 @@ PATCH_MARGIN = wp.constant(0.06)
 """Part of a patch's side added around it, so that neighbours on a bent surface overlap instead of leaving a slit. With
 0.02 one ray in a thousand slipped through to the far wall, specks in the picture; with 0.06 none did, at a fifth more
 wrong hits along silhouettes."""
-LARGE = wp.constant(2 << 16)
+TOO_LARGE = wp.constant(2 << 16)
 """Fixed-point texels across from which a triangle of a dense mesh is kept as it is."""
 KEPT = wp.constant(-1)
 """Stands for the cell of a triangle that is kept as it is."""
@@ -48,23 +48,23 @@ KEPT = wp.constant(-1)
 class Piece:
     """A record's shape: corner, and the two edges from it; a triangle, or a parallelogram."""
 
-    corner: wp.vec3  # cell space
+    corner: wp.vec3  # cell space, a patch's that of the survey
     edge_u: wp.vec3
     edge_v: wp.vec3
-    kind: float  # one of ``grid.py``
+    kind: int  # of ``grid.py``
     triangle: int
 
 
 @wp.struct
 class PatchTarget:
-    """The mesh in the box of texels that its patches are made in, and the cells over them."""
+    """The mesh in the box of texels that its patches are made in, and the cells of the survey over them."""
 
     fixed: wp.array(dtype=wp.vec4i)  # vertices in fixed-point texels, and a hash of their place
     faces: wp.array(dtype=wp.vec3i)
     size: wp.vec3i  # texels
     first_texel: wp.vec3i  # of each axis' map
     cells_per_texel: float
-    bricks: wp.vec3i
+    cells: wp.vec3i
 
 
 @wp.struct
@@ -115,13 +115,13 @@ def patch_piece(target: PatchTarget, giver: Corners, axis: int, u: int, v: int, 
     # The record's normal is the triangle's.
     piece.edge_u = wp.where(normal[axis] < 0.0, along_v, along_u)
     piece.edge_v = wp.where(normal[axis] < 0.0, along_u, along_v)
-    piece.kind = SMALL_PATCH
+    piece.kind = axis
     for i in range(3):
         longest = wp.max(giver.a[i], wp.max(giver.b[i], giver.c[i])) - wp.min(
             giver.a[i], wp.min(giver.b[i], giver.c[i])
         )
         if unsnap(longest) > 1.0:
-            piece.kind = LARGE_PATCH
+            piece.kind = axis + LARGE
     piece.triangle = giver.triangle
     return piece
 
@@ -173,7 +173,7 @@ def survey_triangles(
 ):
     chunk = first + wp.tid()
     begin = CHUNK * chunk
-    nx, ny, nz = BRICK * target.bricks[0], BRICK * target.bricks[1], BRICK * target.bricks[2]
+    nx, ny, nz = target.cells[0], target.cells[1], target.cells[2]
     third = target.cells_per_texel * TEXEL_OF_SUBTEXEL / 3.0
     small = int(0)
     patches = int(0)
@@ -193,14 +193,14 @@ def survey_triangles(
         low_x, high_x = wp.min(a[0], wp.min(b[0], c[0])), wp.max(a[0], wp.max(b[0], c[0]))
         low_y, high_y = wp.min(a[1], wp.min(b[1], c[1])), wp.max(a[1], wp.max(b[1], c[1]))
         low_z, high_z = wp.min(a[2], wp.min(b[2], c[2])), wp.max(a[2], wp.max(b[2], c[2]))
-        if wp.max(high_x - low_x, wp.max(high_y - low_y, high_z - low_z)) > LARGE:
+        if wp.max(high_x - low_x, wp.max(high_y - low_y, high_z - low_z)) > TOO_LARGE:
             cell_out[triangle] = KEPT
         else:
             small += 1
             x = cell_number(third * (float(a[0]) + float(b[0]) + float(c[0])), nx)
             y = cell_number(third * (float(a[1]) + float(b[1]) + float(c[1])), ny)
             z = cell_number(third * (float(a[2]) + float(b[2]) + float(c[2])), nz)
-            cell_out[triangle] = number_of_cell(target.bricks, x, y, z)
+            cell_out[triangle] = number_of_cell(target.cells, x, y, z)
             # Most triangles of a dense mesh lie between texel centres along two axes and end here.
             if holds_centre(low_x, high_x) + holds_centre(low_y, high_y) + holds_centre(low_z, high_z) >= 2:
                 giver = Corners()
@@ -263,14 +263,16 @@ def list_kept(
 
 
 class Survey:
-    """The survey of a mesh's triangles in a box of texels."""
+    """The survey of a mesh's triangles in a box of texels, with ``cells`` along its longest side."""
 
-    def __init__(self, geometry: DeviceMesh, frame: TexelFrame, cells_per_texel: float, bricks: wp.vec3i) -> None:
+    def __init__(self, geometry: DeviceMesh, frame: TexelFrame, cells: int) -> None:
         self._device, self._triangles = geometry.vertices.device, len(geometry.faces)
+        self.frame, self.cells_per_texel = frame, cells / max(frame.size)
+        self.cells = wp.vec3i(*frame.cells(cells))
         target = PatchTarget()
         target.fixed, target.faces = snapped_vertices(geometry, frame), geometry.faces
         target.size, target.first_texel = wp.vec3i(*frame.size), wp.vec3i(*frame.first_texels[:3])
-        target.cells_per_texel, target.bricks = cells_per_texel, bricks
+        target.cells_per_texel, target.cells = self.cells_per_texel, self.cells
         self._target = target
         chunks = chunk_count(self._triangles)
         small, counts, self._givers = (wp.zeros(chunks + 1, dtype=wp.int32, device=self._device) for _ in range(3))

@@ -190,7 +190,7 @@ def test_same_bits_for_any_number_of_threads() -> None:
         for threads in (1, 2, 5):
             ldtrefl.set_threads(threads)
             view = ldtrefl.peel(mesh.vertices, mesh.faces).grid.view
-            rows.append([getattr(view, name).numpy().copy() for name in ("leaps", "brick", "mask", "block", "rows")])
+            rows.append([getattr(view, name).numpy().copy() for name in ("leaps", "node", "row", "boxes", "rows")])
         for other in rows[1:]:
             for a, b in zip(rows[0], other, strict=True):
                 np.testing.assert_array_equal(a, b)
