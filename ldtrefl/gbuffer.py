@@ -17,7 +17,14 @@ from ldtrefl import launch
 from ldtrefl.binning import CHUNK, chunk_count, gather_lists, launch_chunks
 from ldtrefl.camera import CameraView, camera_view, pixels_from_world
 from ldtrefl.device_scene import DeviceScene, ObjectRecord
-from ldtrefl.raster import homogeneous_triangle, inverse_depth, perspective_weights, planar_nearness
+from ldtrefl.raster import (
+    highest,
+    homogeneous_triangle,
+    inverse_depth,
+    lowest,
+    perspective_weights,
+    planar_nearness,
+)
 from ldtrefl.scene import Camera
 from ldtrefl.shade import surface_at
 
@@ -117,20 +124,19 @@ def beyond(corner: wp.vec3d, width: int, height: int) -> int:
 def pixel_box(a: wp.vec3d, b: wp.vec3d, c: wp.vec3d, width: int, height: int) -> PixelBox:
     """The pixels whose centres lie in the box about a projected triangle; all where that has no bounds in the view."""
     box = PixelBox()
-    nearest = wp.max(a[2], wp.max(b[2], c[2]))
-    farthest = wp.min(a[2], wp.min(b[2], c[2]))
     box.last_x = -1
-    if nearest > BEHIND:
-        low_x, high_x = wp.min(a[0], wp.min(b[0], c[0])), wp.max(a[0], wp.max(b[0], c[0]))
-        low_y, high_y = wp.min(a[1], wp.min(b[1], c[1])), wp.max(a[1], wp.max(b[1], c[1]))
-        limit = GUARD - wp.float64(1.0)
-        box.planar = farthest > BEHIND and wp.min(low_x, low_y) > -limit and wp.max(high_x, high_y) < limit
-        if box.planar:
-            box.first_x = wp.max(first_pixel(low_x), 0)
-            box.last_x = wp.min(last_pixel(high_x), width - 1)
-            box.first_y = wp.max(first_pixel(low_y), 0)
-            box.last_y = wp.min(last_pixel(high_y), height - 1)
-        elif (beyond(a, width, height) & beyond(b, width, height) & beyond(c, width, height)) == 0:
+    farthest = lowest(a[2], b[2], c[2])
+    low_x, high_x = lowest(a[0], b[0], c[0]), highest(a[0], b[0], c[0])
+    low_y, high_y = lowest(a[1], b[1], c[1]), highest(a[1], b[1], c[1])
+    limit = GUARD - wp.float64(1.0)
+    box.planar = farthest > BEHIND and low_x > -limit and low_y > -limit and high_x < limit and high_y < limit
+    if box.planar:
+        box.first_x = wp.max(first_pixel(low_x), 0)
+        box.last_x = wp.min(last_pixel(high_x), width - 1)
+        box.first_y = wp.max(first_pixel(low_y), 0)
+        box.last_y = wp.min(last_pixel(high_y), height - 1)
+    elif highest(a[2], b[2], c[2]) > BEHIND:
+        if (beyond(a, width, height) & beyond(b, width, height) & beyond(c, width, height)) == 0:
             box.last_x = width - 1
             box.last_y = height - 1
     return box
@@ -188,10 +194,15 @@ def draw_rows(
     c = mesh.corners[mesh.first_vertex + face[2]]
     half = wp.float64(0.5)
     if box.planar:
-        for y in range(first_y, last_y + 1):
-            for x in range(box.first_x, box.last_x + 1):
+        # Not by ``range``, whose loop tests its step's sign each time: most triangles cover a pixel or two.
+        y = int(first_y)
+        while y <= last_y:
+            x = int(box.first_x)
+            while x <= box.last_x:
                 nearness = planar_nearness(a, b, c, wp.float64(x) + half, wp.float64(y) + half)
                 keep_nearest(mesh, triangle, x, y, nearness, keys)
+                x += 1
+            y += 1
     else:
         tri = homogeneous_triangle(homogeneous(a), homogeneous(b), homogeneous(c))
         for y in range(first_y, last_y + 1):

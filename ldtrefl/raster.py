@@ -197,6 +197,20 @@ def inverse_depth(tri: HomogeneousTriangle, weights: wp.vec3d) -> float:
 
 
 @wp.func
+def lowest(a: wp.float64, b: wp.float64, c: wp.float64) -> wp.float64:
+    """The least of three numbers, in an instruction each: ``wp.min`` takes four more to look for NaNs."""
+    low = wp.where(a < b, a, b)
+    return wp.where(low < c, low, c)
+
+
+@wp.func
+def highest(a: wp.float64, b: wp.float64, c: wp.float64) -> wp.float64:
+    """The greatest of three numbers."""
+    high = wp.where(a > b, a, b)
+    return wp.where(high > c, high, c)
+
+
+@wp.func
 def planar_edge(a: wp.vec3d, b: wp.vec3d, x: wp.float64, y: wp.float64) -> wp.float64:
     """Twice the signed area of (a, b, point), values within rounding of 0 taken to be 0."""
     along, across = (b[0] - a[0]) * (y - a[1]), (b[1] - a[1]) * (x - a[0])
@@ -211,7 +225,7 @@ def planar_nearness(a: wp.vec3d, b: wp.vec3d, c: wp.vec3d, x: wp.float64, y: wp.
     at_a, at_b, at_c = planar_edge(b, c, x, y), planar_edge(c, a, x, y), planar_edge(a, b, x, y)
     zero = wp.float64(0.0)
     area = at_a + at_b + at_c
-    if wp.min(at_a, wp.min(at_b, at_c)) < zero and wp.max(at_a, wp.max(at_b, at_c)) > zero:
+    if lowest(at_a, at_b, at_c) < zero and highest(at_a, at_b, at_c) > zero:
         return 0.0
     if area == zero:
         return 0.0
