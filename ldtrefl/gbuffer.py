@@ -26,7 +26,7 @@ from ldtrefl.raster import (
     planar_nearness,
 )
 from ldtrefl.scene import Camera
-from ldtrefl.shade import surface_at
+from ldtrefl.shade import Surface, surface_at
 
 LARGE_BOX = wp.constant(4096)
 """Pixels in a triangle's box from which it is drawn in bands of rows, so that all threads share it."""
@@ -54,6 +54,7 @@ class GBufferView:
     object: wp.array(dtype=wp.int32)  # -1 where nothing is seen
     triangle: wp.array(dtype=wp.int32)
     barycentrics: wp.array(dtype=wp.vec2)  # weights of the second and third corner
+    reflector: wp.array(dtype=wp.uint8)  # 1 where a reflector is seen
     camera: CameraView
 
 
@@ -296,6 +297,8 @@ def resolve_pixels(
     object_out: wp.array(dtype=wp.int32),
     triangle_out: wp.array(dtype=wp.int32),
     barycentrics_out: wp.array(dtype=wp.vec2),
+    # Out, 0 before:
+    reflector_out: wp.array(dtype=wp.uint8),
 ):
     i = first + wp.tid()
     if keys[i] == wp.int64(0):
@@ -318,6 +321,8 @@ def resolve_pixels(
     object_out[i] = index
     triangle_out[i] = triangle
     barycentrics_out[i] = wp.vec2(float(at[1] / total), float(at[2] / total))
+    if wp.max(objects[index].mirror) > 0.0:
+        reflector_out[i] = wp.uint8(1)
 
 
 @launch.kernel
@@ -332,15 +337,7 @@ def find_surfaces(
 ):
     i = first + wp.tid()
     if gbuffer.object[i] >= 0:
-        view = pixel_view(gbuffer, objects, i)
-        surface = surface_at(
-            objects,
-            gbuffer.object[i],
-            gbuffer.triangle[i],
-            gbuffer.barycentrics[i][0],
-            gbuffer.barycentrics[i][1],
-            view,
-        )
+        surface = pixel_surface(gbuffer, objects, i, pixel_view(gbuffer, objects, i))
         position_out[i] = surface.position
         normal_out[i] = surface.normal
 
@@ -359,6 +356,13 @@ def pixel_view(gbuffer: GBufferView, objects: wp.array(dtype=ObjectRecord), pixe
     return wp.normalize(wp.transform_point(objects[index].device_from_unit, point) - gbuffer.camera.eye)
 
 
+@wp.func
+def pixel_surface(gbuffer: GBufferView, objects: wp.array(dtype=ObjectRecord), pixel: int, view: wp.vec3) -> Surface:
+    """The surface that the pixel sees along unit direction ``view``."""
+    uv = gbuffer.barycentrics[pixel]
+    return surface_at(objects, gbuffer.object[pixel], gbuffer.triangle[pixel], uv[0], uv[1], view)
+
+
 @dataclass(eq=False)
 class GBuffer:
     """What a camera sees, row by row; positions and normals are made when they are asked for."""
@@ -366,7 +370,7 @@ class GBuffer:
     scene: DeviceScene
     camera: Camera
     view: GBufferView
-    """Object, triangle and barycentrics of (height * width) pixels, and the camera."""
+    """Of (height * width) pixels what each sees, and the camera."""
 
     @property
     def pixel_count(self) -> int:
@@ -386,8 +390,7 @@ class GBuffer:
     @functools.cached_property
     def reflector_mask(self) -> np.ndarray:
         """(h, w) bool: pixels that see a reflector."""
-        mirrors = np.array([entry.source.is_reflector for entry in self.scene.objects] + [False])
-        return mirrors.take(self.objects, mode="wrap")  # -1 picks the last, False
+        return self.view.reflector.numpy().view(bool).reshape(self.camera.height, self.camera.width)
 
     @functools.cached_property
     def surfaces(self) -> tuple[wp.array, wp.array]:
@@ -444,12 +447,13 @@ class Drawing:
         view = GBufferView()
         view.object, view.triangle = (wp.empty(pixels, dtype=wp.int32, device=device) for _ in range(2))
         view.barycentrics = wp.empty(pixels, dtype=wp.vec2, device=device)
+        view.reflector = wp.zeros(pixels, dtype=wp.uint8, device=device)
         view.camera = camera_view(camera, scene.device_from_world)
         if scene.objects:
             firsts = wp.array([entry.record.first_triangle for entry in scene.objects], dtype=wp.int32, device=device)
             starts = wp.array(_first_vertices(scene)[:-1], dtype=wp.int32, device=device)
             inputs = [self.keys, firsts, starts, scene.records, self.corners, camera.width]
-            outputs = [view.object, view.triangle, view.barycentrics]
+            outputs = [view.object, view.triangle, view.barycentrics, view.reflector]
             launch.launch(resolve_pixels, pixels, [*inputs, *outputs], device)
         else:
             view.object.fill_(-1)

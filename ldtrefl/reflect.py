@@ -20,8 +20,8 @@ import warp as wp
 from ldtrefl import launch
 from ldtrefl.camera import camera_ray
 from ldtrefl.cull import Culled
-from ldtrefl.device_scene import DeviceScene, LightingRecord, ObjectRecord
-from ldtrefl.gbuffer import GBuffer, GBufferView, pixel_view
+from ldtrefl.device_scene import LightingRecord, ObjectRecord
+from ldtrefl.gbuffer import GBuffer, GBufferView, pixel_surface, pixel_view
 from ldtrefl.kept import Followed, changed_runs, put_hits, rays_of_runs
 from ldtrefl.rays import HitBuffer, RayBuffer, Regions, lowest_bit, meets_sphere, object_bits, sphere_entry
 from ldtrefl.shade import (
@@ -236,7 +236,7 @@ def direct_radiance_of(tracer: Tracer) -> Any:
 
 @functools.cache
 def shade_pixels_kernel(tracer: Tracer) -> wp.Kernel:
-    """The kernel that shades what the camera sees, reflections left out."""
+    """The kernel that shades what the camera sees, reflectors left out."""
     direct_radiance = direct_radiance_of(tracer)
 
     @launch.kernel
@@ -249,22 +249,49 @@ def shade_pixels_kernel(tracer: Tracer) -> wp.Kernel:
         views: wp.array(dtype=tracer.view),
         # Out:
         radiance_out: wp.array(dtype=wp.vec3),
-        mirror_out: wp.array(dtype=wp.vec3),
     ):
         i = first + wp.tid()
-        index = gbuffer.object[i]
-        mirror_out[i] = wp.vec3(0.0)
-        if index < 0:
+        if gbuffer.object[i] < 0:
             x, y = float(i % gbuffer.camera.width) + 0.5, float(i / gbuffer.camera.width) + 0.5
             radiance_out[i] = environment_radiance(lighting, wp.normalize(camera_ray(gbuffer.camera, x, y)))
-        else:
-            uv = gbuffer.barycentrics[i]
-            view = pixel_view(gbuffer, objects, i)
-            surface = surface_at(objects, index, gbuffer.triangle[i], uv[0], uv[1], view)
+        elif gbuffer.reflector[i] == wp.uint8(0):
+            surface = pixel_surface(gbuffer, objects, i, pixel_view(gbuffer, objects, i))
             radiance_out[i] = direct_radiance(views, objects, lighting, surface)
-            mirror_out[i] = surface.mirror
 
     return shade_pixels
+
+
+@functools.cache
+def shade_reflectors_kernel(tracer: Tracer) -> wp.Kernel:
+    """The kernel that shades the pixels that see a reflector, without what it reflects, and starts their rays."""
+    direct_radiance = direct_radiance_of(tracer)
+
+    @launch.kernel
+    def shade_reflectors(
+        first: int,
+        # In:
+        gbuffer: GBufferView,
+        objects: wp.array(dtype=ObjectRecord),
+        lighting: LightingRecord,
+        views: wp.array(dtype=tracer.view),
+        # In: of each ray the pixel. Out: the rest
+        rays: RayBuffer,
+        # Out:
+        radiance_out: wp.array(dtype=wp.vec3),
+        mirror_out: wp.array(dtype=wp.vec3),  # of each ray
+    ):
+        i = first + wp.tid()
+        pixel = rays.pixel[i]
+        view = pixel_view(gbuffer, objects, pixel)
+        surface = pixel_surface(gbuffer, objects, pixel, view)
+        radiance_out[pixel] = direct_radiance(views, objects, lighting, surface)
+        mirror_out[i] = surface.mirror
+        rays.origin[i] = surface.position
+        rays.direction[i] = mirror_direction(view, surface.normal)
+        rays.weight[i] = wp.vec3(1.0)
+        rays.source[i] = gbuffer.object[pixel]
+
+    return shade_reflectors
 
 
 @functools.cache
@@ -319,27 +346,6 @@ def shade_hits_kernel(tracer: Tracer) -> wp.Kernel:
     return shade_hits
 
 
-@launch.kernel
-def start_rays(
-    first: int,
-    # In:
-    gbuffer: GBufferView,
-    objects: wp.array(dtype=ObjectRecord),
-    # In and out:
-    rays: RayBuffer,
-):
-    i = first + wp.tid()
-    pixel = rays.pixel[i]
-    index = gbuffer.object[pixel]
-    uv = gbuffer.barycentrics[pixel]
-    view = pixel_view(gbuffer, objects, pixel)
-    surface = surface_at(objects, index, gbuffer.triangle[pixel], uv[0], uv[1], view)
-    rays.origin[i] = surface.position
-    rays.direction[i] = mirror_direction(view, surface.normal)
-    rays.weight[i] = wp.vec3(1.0)
-    rays.source[i] = index
-
-
 @dataclass(frozen=True, eq=False)
 class FirstHits:
     """Where the rays of the first reflection end, per pixel of the image; each picture is made when it is asked for."""
@@ -373,25 +379,12 @@ class FirstHits:
         return picture.reshape(self.shape)
 
 
-def mirror_rays(gbuffer: GBuffer) -> Any:
-    """The ``RayBuffer`` of the first reflection: one ray per pixel that sees a reflector, in blocks of pixels."""
-    scene, device = gbuffer.scene, gbuffer.scene.device
-    pixels = pixels_in_blocks(gbuffer.reflector_mask)
-    n = len(pixels)
-    rays = RayBuffer()
-    rays.pixel = wp.array(pixels, dtype=wp.int32, device=device)
-    rays.origin, rays.direction, rays.weight = (wp.empty(n, dtype=wp.vec3, device=device) for _ in range(3))
-    rays.source = wp.empty(n, dtype=wp.int32, device=device)
-    launch.launch(start_rays, n, [gbuffer.view, scene.records, rays], device)
-    return rays
-
-
 def pixels_in_blocks(mask: np.ndarray) -> np.ndarray:
     """(n,) int32 numbers of the pixels set in an (h, w) bool mask, block by block of ``BLOCK`` x ``BLOCK``."""
     height, width = mask.shape
     padded = np.pad(mask, ((0, -height % BLOCK), (0, -width % BLOCK)))
     blocks = padded.reshape(padded.shape[0] // BLOCK, BLOCK, padded.shape[1] // BLOCK, BLOCK).transpose(0, 2, 1, 3)
-    return _pixels_by_place(height, width)[np.flatnonzero(blocks)]
+    return _pixels_by_place(height, width)[blocks.ravel()]
 
 
 @functools.lru_cache(maxsize=4)
@@ -405,6 +398,7 @@ def _pixels_by_place(height: int, width: int) -> np.ndarray:
 
 def follow_rays(
     gbuffer: GBuffer,
+    rays: Any,
     cull: Callable[[Any, int], Culled],
     bind: Callable[[set[int]], BoundTracer],
     max_bounces: int,
@@ -416,6 +410,7 @@ def follow_rays(
     """Follow the rays of the pixels that see a reflector.
 
     Args:
+        rays: their ``RayBuffer``.
         cull: ``cull(rays, bounce)`` says which objects rays may meet.
         bind: ``bind(objects)`` makes the tracer ready for those.
         before: the last frame's, in the same device space.
@@ -427,8 +422,6 @@ def follow_rays(
     """
     scene, device = gbuffer.scene, gbuffer.scene.device
     shadows = bool(scene.lighting.shadows)
-    with stats.stage("march", device):
-        rays = mirror_rays(gbuffer)
     with stats.stage("cull", device):
         culled = cull(rays, 0)
         runs = None
@@ -510,11 +503,29 @@ def _hit_buffer(n: int, device: wp.Device) -> Any:
     return hits
 
 
-def shade_gbuffer(gbuffer: GBuffer, shadow: BoundTracer) -> tuple[wp.array, wp.array]:
-    """(radiance without reflections, specular reflectance) of every pixel, (h * w,) vec3 each."""
-    scene: DeviceScene = gbuffer.scene
-    radiance = wp.empty(gbuffer.pixel_count, dtype=wp.vec3, device=scene.device)
-    mirror = wp.empty(gbuffer.pixel_count, dtype=wp.vec3, device=scene.device)
-    inputs = [gbuffer.view, scene.records, scene.lighting, shadow.views, radiance, mirror]
-    launch.launch(shade_pixels_kernel(shadow.tracer), gbuffer.pixel_count, inputs, scene.device)
-    return radiance, mirror
+@dataclass(frozen=True, eq=False)
+class Shaded:
+    """What a camera sees, but for what reflectors reflect."""
+
+    radiance: wp.array
+    """(h * w,) vec3, reflections left out."""
+    rays: Any
+    """The ``RayBuffer`` of the first reflection: one ray per pixel that sees a reflector, in blocks of pixels."""
+    mirror: wp.array
+    """(rays,) vec3: the reflector's specular reflectance."""
+
+
+def shade_gbuffer(gbuffer: GBuffer, shadow: BoundTracer) -> Shaded:
+    """Shade every pixel, and start the rays of those that see a reflector."""
+    scene, device = gbuffer.scene, gbuffer.scene.device
+    radiance = wp.empty(gbuffer.pixel_count, dtype=wp.vec3, device=device)
+    inputs = [gbuffer.view, scene.records, scene.lighting, shadow.views]
+    launch.launch(shade_pixels_kernel(shadow.tracer), gbuffer.pixel_count, [*inputs, radiance], device)
+    pixels = pixels_in_blocks(gbuffer.reflector_mask)
+    n = len(pixels)
+    rays = RayBuffer()
+    rays.pixel = wp.array(pixels, dtype=wp.int32, device=device)
+    rays.origin, rays.direction, rays.weight, mirror = (wp.empty(n, dtype=wp.vec3, device=device) for _ in range(4))
+    rays.source = wp.empty(n, dtype=wp.int32, device=device)
+    launch.launch(shade_reflectors_kernel(shadow.tracer), n, [*inputs, rays, radiance, mirror], device)
+    return Shaded(radiance, rays, mirror)

@@ -16,7 +16,7 @@ from ldtrefl.kept import KeptDrawing
 from ldtrefl.launch import Stats
 from ldtrefl.methods import find_method
 from ldtrefl.methods.base import Reflection
-from ldtrefl.reflect import FirstHits, no_shadows, shade_gbuffer
+from ldtrefl.reflect import FirstHits, Shaded, no_shadows, shade_gbuffer
 from ldtrefl.scene import Camera, Scene, Vector
 from ldtrefl.skips import chosen
 
@@ -41,23 +41,23 @@ class Frame:
 def add_reflection(
     first: int,
     # In:
-    direct: wp.array(dtype=wp.vec3),
+    pixels: wp.array(dtype=wp.int32),
     mirror: wp.array(dtype=wp.vec3),
     reflected: wp.array(dtype=wp.vec3),
-    # Out:
-    image_out: wp.array(dtype=wp.vec3),
+    # In and out:
+    image: wp.array(dtype=wp.vec3),
 ):
     i = first + wp.tid()
-    image_out[i] = direct[i] + wp.cw_mul(mirror[i], reflected[i])
+    pixel = pixels[i]
+    image[pixel] = image[pixel] + wp.cw_mul(mirror[i], reflected[pixel])
 
 
 @dataclass(frozen=True, eq=False)
-class _Shaded:
+class _Parts:
     """What a frame is composed of."""
 
     gbuffer: GBuffer
-    direct: wp.array
-    mirror: wp.array
+    shaded: Shaded
     reflection: Reflection
     stages: tuple[str, ...]
     """What was timed."""
@@ -85,7 +85,7 @@ class Renderer:
         self._device_scene = DeviceScene(scene, launch.resolve_device(device), skip_attributes=skips.attributes)
         self._method = kind(self._device_scene, config)
         self._drawing = KeptDrawing()
-        self._last: _Shaded | None = None
+        self._last: _Parts | None = None
 
     def move(
         self,
@@ -116,41 +116,40 @@ class Renderer:
         scene.look_from(camera)
         last = self._last if self._method.skips.frames else None
         is_kept = last is not None and last.gbuffer.camera == camera and last.gbuffer.scene is scene
-        shaded = last if is_kept and last is not None else self._shaded(camera, stats)
-        self._last = shaded
-        gbuffer, reflection = shaded.gbuffer, shaded.reflection
+        parts = last if is_kept and last is not None else self._parts(camera, stats)
+        self._last = parts
+        gbuffer, shaded, reflection = parts.gbuffer, parts.shaded, parts.reflection
         mask = gbuffer.reflector_mask
-        reflector_pixels = int(np.count_nonzero(mask))
+        reflector_pixels = shaded.rays.pixel.shape[0]
         if is_kept:
             stats.count("frames_kept", 1)
             stats.count("rays_kept", reflector_pixels)
-            stats.seconds.update(dict.fromkeys(shaded.stages, 0.0))
+            stats.seconds.update(dict.fromkeys(parts.stages, 0.0))
         stats.count("pixels", gbuffer.pixel_count)
         stats.count("reflector_pixels", reflector_pixels)
         stats.count("rays", 0)
         stats.count("attribute_bytes", scene.attribute_bytes)
         with stats.stage("composite", device):
-            image = wp.empty(gbuffer.pixel_count, dtype=wp.vec3, device=device)
-            inputs = [shaded.direct, shaded.mirror, reflection.radiance, image]
-            launch.launch(add_reflection, gbuffer.pixel_count, inputs, device)
+            image = wp.clone(shaded.radiance)
+            inputs = [shaded.rays.pixel, shaded.mirror, reflection.radiance, image]
+            launch.launch(add_reflection, reflector_pixels, inputs, device)
             shape = (camera.height, camera.width, 3)
             picture, reflected = (array.numpy().reshape(shape) for array in (image, reflection.radiance))
         return Frame(picture, reflected, mask, stats, reflection.hits)
 
-    def _shaded(self, camera: Camera, stats: Stats) -> _Shaded:
+    def _parts(self, camera: Camera, stats: Stats) -> _Parts:
         """G-buffer, direct light and reflections."""
         scene, device, method = self._device_scene, self._device_scene.device, self._method
         with stats.stage("gbuffer", device):
             gbuffer = self._drawing.gbuffer(scene, camera) if method.skips.frames else draw_gbuffer(scene, camera)
-            sees_reflector = bool(gbuffer.reflector_mask.any())
         shadow = method.shadow_tracer(stats) if self.scene.lighting.shadows else no_shadows(device)
         with stats.stage("shade", device):
-            direct, mirror = shade_gbuffer(gbuffer, shadow)
-        if sees_reflector or not method.skips.reflection:
-            reflection = method.reflect(gbuffer, stats)
+            shaded = shade_gbuffer(gbuffer, shadow)
+        if shaded.rays.pixel.shape[0] or not method.skips.reflection:
+            reflection = method.reflect(gbuffer, shaded.rays, stats)
         else:
             reflection = Reflection(wp.zeros(gbuffer.pixel_count, dtype=wp.vec3, device=device))
-        return _Shaded(gbuffer, direct, mirror, reflection, tuple(stats.seconds))
+        return _Parts(gbuffer, shaded, reflection, tuple(stats.seconds))
 
     @property
     def gbuffer(self) -> GBuffer | None:

@@ -8,7 +8,13 @@ import warp as wp
 from ldtrefl import launch
 from ldtrefl.march import TRACERS
 from ldtrefl.raycast import BVH
-from ldtrefl.reflect import NOTHING, closest_hits_kernel, shade_hits_kernel, shade_pixels_kernel
+from ldtrefl.reflect import (
+    NOTHING,
+    closest_hits_kernel,
+    shade_hits_kernel,
+    shade_pixels_kernel,
+    shade_reflectors_kernel,
+)
 from ldtrefl.render import Renderer  # noqa: F401  (imports every module that defines kernels)
 from ldtrefl.trace import batch_kernel
 
@@ -20,6 +26,7 @@ def all_kernels() -> list[wp.Kernel]:
     for tracer in (NOTHING, BVH, *TRACERS.values()):
         shade_hits_kernel(tracer)
         shade_pixels_kernel(tracer)
+        shade_reflectors_kernel(tracer)
     return [kernel for kernel in launch.KERNELS if kernel.func.__module__.startswith("ldtrefl.")]
 
 

@@ -27,7 +27,7 @@ from timing import in_turn
 import ldtrefl
 from ldtrefl import launch, skips
 from ldtrefl.files import written_whole
-from ldtrefl.reflect import mirror_rays
+from ldtrefl.reflect import no_shadows, shade_gbuffer
 from ldtrefl.render import Frame, Renderer
 from ldtrefl.scene import Camera, Material, Object, Scene
 
@@ -244,7 +244,7 @@ def culling(scene: Scene, rounds: int) -> dict[str, Any] | None:
 def rays_that_enter(renderer: Renderer) -> int:
     """Pairs of a reflected ray of the last frame and another object's bounding sphere that it meets, in float64."""
     assert renderer.gbuffer is not None
-    rays, count = mirror_rays(renderer.gbuffer), 0
+    rays, count = shade_gbuffer(renderer.gbuffer, no_shadows(renderer.gbuffer.scene.device)).rays, 0
     origin, direction = rays.origin.numpy().astype(float), rays.direction.numpy().astype(float)
     source = rays.source.numpy()
     for entry in renderer.gbuffer.scene.objects:

@@ -63,8 +63,9 @@ class Method(abc.ABC):
         self.scene = scene
 
     @abc.abstractmethod
-    def reflect(self, gbuffer: GBuffer, stats: Stats) -> Reflection:
-        """The reflections in what the camera sees. Called only if it sees a reflector."""
+    def reflect(self, gbuffer: GBuffer, rays: Any, stats: Stats) -> Reflection:
+        """The reflections in what the camera sees, from the ``RayBuffer`` of its pixels that see a reflector. Called
+        only if there are any."""
 
     @abc.abstractmethod
     def shadow_tracer(self, stats: Stats) -> BoundTracer:

@@ -10,7 +10,7 @@ Fails: nowhere that the scene's triangles can tell; its cost grows with them, an
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import warp as wp
 from pydantic import Field
@@ -51,10 +51,10 @@ class Bvh(Method):
         """The BVH itself."""
         return self._bind(stats)
 
-    def reflect(self, gbuffer: GBuffer, stats: Stats) -> Reflection:
+    def reflect(self, gbuffer: GBuffer, rays: Any, stats: Stats) -> Reflection:
         """Trace every reflected ray."""
         bounces = self.config.max_bounces or self.scene.scene.reflection.max_bounces
         everything = not_culled(self.scene)
         cull, bind = (lambda _rays, _bounce: everything), (lambda _objects: self._bind(stats))
-        followed, hits = follow_rays(gbuffer, cull, bind, bounces, self.skips, stats)
+        followed, hits = follow_rays(gbuffer, rays, cull, bind, bounces, self.skips, stats)
         return Reflection(followed.radiance, hits)

@@ -19,14 +19,14 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from ldtrefl import launch
-from ldtrefl.device_scene import DeviceObject, DeviceScene, ObjectRecord
-from ldtrefl.gbuffer import GBuffer, GBufferView, draw_gbuffer, pixel_view
+from ldtrefl.device_scene import DeviceObject, DeviceScene
+from ldtrefl.gbuffer import GBuffer, draw_gbuffer
 from ldtrefl.launch import Stats
 from ldtrefl.methods.base import CONFIG, CommonConfig, Method, Reflection
 from ldtrefl.raycast import BVH, BvhView, Raycaster
+from ldtrefl.rays import RayBuffer
 from ldtrefl.reflect import BoundTracer, no_shadows, shade_gbuffer
 from ldtrefl.scene import Camera
-from ldtrefl.shade import mirror_direction, surface_at
 
 
 @wp.func
@@ -68,8 +68,7 @@ def look_up(cube: wp.array(dtype=wp.vec3), resolution: int, direction: wp.vec3) 
 def reflect_cube(
     first: int,
     # In:
-    gbuffer: GBufferView,
-    objects: wp.array(dtype=ObjectRecord),
+    rays: RayBuffer,
     reflector: int,
     cube: wp.array(dtype=wp.vec3),
     resolution: int,
@@ -77,11 +76,8 @@ def reflect_cube(
     radiance_out: wp.array(dtype=wp.vec3),
 ):
     i = first + wp.tid()
-    if gbuffer.object[i] == reflector:
-        uv = gbuffer.barycentrics[i]
-        view = pixel_view(gbuffer, objects, i)
-        surface = surface_at(objects, reflector, gbuffer.triangle[i], uv[0], uv[1], view)
-        radiance_out[i] = look_up(cube, resolution, mirror_direction(view, surface.normal))
+    if rays.source[i] == reflector:
+        radiance_out[rays.pixel[i]] = look_up(cube, resolution, rays.direction[i])
 
 
 class EnvironmentMap(Method):
@@ -115,19 +111,20 @@ class EnvironmentMap(Method):
                 self._shadows = BoundTracer(BVH, wp.array(views, dtype=BvhView, device=self.scene.device))
         return self._shadows
 
-    def reflect(self, gbuffer: GBuffer, stats: Stats) -> Reflection:
+    def reflect(self, gbuffer: GBuffer, rays: Any, stats: Stats) -> Reflection:
         """Draw the cube maps on first need, then look up every reflector pixel."""
-        device, n = self.scene.device, gbuffer.pixel_count
-        radiance = wp.zeros(n, dtype=wp.vec3, device=device)
-        stats.count("rays", int(gbuffer.reflector_mask.sum()))
+        device, n = self.scene.device, rays.pixel.shape[0]
+        radiance = wp.zeros(gbuffer.pixel_count, dtype=wp.vec3, device=device)
+        stats.count("rays", n)
+        seen = set(np.unique(rays.source.numpy()).tolist())
         for entry in self.scene.reflectors:
-            if not (gbuffer.objects == entry.index).any():
+            if entry.index not in seen:
                 continue
             if entry.index not in self._cubes:
                 self._cubes[entry.index] = self._draw_cube(entry, stats)
             with stats.stage("shade", device):
-                inputs = [gbuffer.view, self.scene.records, entry.index, self._cubes[entry.index]]
-                launch.launch(reflect_cube, n, [*inputs, self.config.resolution, radiance], device)
+                inputs = [rays, entry.index, self._cubes[entry.index], self.config.resolution, radiance]
+                launch.launch(reflect_cube, n, inputs, device)
         return Reflection(radiance)
 
     def _draw_cube(self, reflector: DeviceObject, stats: Stats) -> wp.array:
@@ -150,5 +147,5 @@ class EnvironmentMap(Method):
                     height=self.config.resolution,
                 )
                 seen = draw_gbuffer(self.scene, camera, without=reflector.index)
-                faces.append(shade_gbuffer(seen, shadow)[0].numpy())
+                faces.append(shade_gbuffer(seen, shadow).radiance.numpy())
         return wp.array(np.concatenate(faces), dtype=wp.vec3, device=self.scene.device)

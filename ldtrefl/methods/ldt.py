@@ -115,28 +115,28 @@ class Ldt(Method):
         """All objects' maps."""
         return self._bind({entry.index for entry in self.scene.objects}, stats)
 
-    def reflect(self, gbuffer: GBuffer, stats: Stats) -> Reflection:
+    def reflect(self, gbuffer: GBuffer, rays: Any, stats: Stats) -> Reflection:
         """Cull, peel what is left on first need, march."""
         bounces = self.config.max_bounces or self.scene.scene.reflection.max_bounces
 
         resolutions: dict[int, int] = {}
 
-        def cull(rays: Any, bounce: int) -> Culled:
+        def cull(going: Any, bounce: int) -> Culled:
             if not self.skips.regions or (self.config.cull == "safe" and not self._culling_pays()):
                 culled = not_culled(self.scene)
             else:
-                culled = cull_rays(gbuffer, rays, bounce, self.config.cull, stats)
+                culled = cull_rays(gbuffer, going, bounce, self.config.cull, stats)
             error, search = self.config.error, self.config.search
             if error is not None and self.config.resolution is None:
                 width = gbuffer.camera.width
-                resolutions.update(resolutions_for(error, search, self.scene, width, rays, culled))
+                resolutions.update(resolutions_for(error, search, self.scene, width, going, culled))
             return culled
 
         def bind(needed: set[int]) -> BoundTracer:
             return self._bind(needed, stats, resolutions)
 
         before, moved = self._before_of(gbuffer)
-        followed, hits = follow_rays(gbuffer, cull, bind, bounces, self.skips, stats, before, moved)
+        followed, hits = follow_rays(gbuffer, rays, cull, bind, bounces, self.skips, stats, before, moved)
         self._last = (gbuffer.camera, self.scene, followed)
         meshes = {id(entry.geometry) for entry in self.scene.objects}
         stats.count("objects_skipped", len(meshes) - len(self._maps))
