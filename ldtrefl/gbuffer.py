@@ -23,6 +23,7 @@ from ldtrefl.raster import (
     inverse_depth,
     lowest,
     perspective_weights,
+    planar_edge,
     planar_nearness,
 )
 from ldtrefl.scene import Camera
@@ -39,6 +40,19 @@ EDGE_SLACK = wp.constant(wp.float64(1.0e-6))
 
 GUARD = wp.constant(wp.float64(1 << 20))
 """Pixels about the image within which a triangle is drawn in the plane; others are drawn homogeneous."""
+
+WIDE = wp.constant(3)
+"""Pixels across a triangle's box from which its rows are cut to what lies between its edges; narrower ones are tested
+faster than cut."""
+
+LEAST_AREA = wp.constant(wp.float64(4.0))
+"""Twice a triangle's square pixels from which the sign of its area is beyond rounding, and its rows are cut."""
+
+LEAST_RISE = wp.constant(wp.float64(0.25))
+"""Rows that an edge crosses at least if rows are cut at it: flatter ones cross a row anywhere, up to rounding."""
+
+CUT_SLACK = wp.constant(wp.float64(1.0 / 64.0))
+"""Pixels by which rows are cut too long: twice the rounding at edges ``2 * GUARD`` long that rise by ``LEAST_RISE``."""
 
 BEHIND = wp.constant(wp.float64(0.0))
 """Depth up to which a point is not in front of the camera."""
@@ -185,6 +199,54 @@ def keep_nearest(mesh: ProjectedMesh, triangle: int, x: int, y: int, nearness: f
 
 
 @wp.func
+def row_bounds(p: wp.vec3d, q: wp.vec3d, area: wp.float64) -> wp.vec4d:
+    """What an edge leaves of row y: from ``[0] + [1] y`` to ``[2] + [3] y``. ``area`` is the triangle's, twice."""
+    rise = q[1] - p[1]
+    bounds = wp.vec4d(-GUARD, BEHIND, GUARD, BEHIND)
+    if wp.abs(rise) > LEAST_RISE and wp.abs(area) > LEAST_AREA:
+        slope = (q[0] - p[0]) / rise
+        offset = p[0] - slope * p[1]
+        if (rise > BEHIND) == (area > BEHIND):
+            bounds[2] = offset + CUT_SLACK
+            bounds[3] = slope
+        else:
+            bounds[0] = offset - CUT_SLACK
+            bounds[1] = slope
+    return bounds
+
+
+@wp.func
+def draw_cut_rows(
+    mesh: ProjectedMesh,
+    triangle: int,
+    a: wp.vec3d,
+    b: wp.vec3d,
+    c: wp.vec3d,
+    box: PixelBox,
+    first_y: int,
+    last_y: int,
+    keys: wp.array(dtype=wp.int64),
+):
+    """Draw a planar triangle's pixels, testing of each row only those between its edges."""
+    half = wp.float64(0.5)
+    area = planar_edge(a, b, c[0], c[1])
+    ab, bc, ca = row_bounds(a, b, area), row_bounds(b, c, area), row_bounds(c, a, area)
+    begin, end = wp.float64(box.first_x), wp.float64(box.last_x) + wp.float64(1.0)
+    y = int(first_y)
+    while y <= last_y:
+        at_y = wp.float64(y) + half
+        low = highest(ab[0] + ab[1] * at_y, bc[0] + bc[1] * at_y, ca[0] + ca[1] * at_y)
+        high = lowest(ab[2] + ab[3] * at_y, bc[2] + bc[3] * at_y, ca[2] + ca[3] * at_y)
+        x = first_pixel(lowest(highest(low, begin, begin), end, end))
+        last_x = last_pixel(highest(lowest(high, end, end), begin, begin))
+        while x <= last_x:
+            nearness = planar_nearness(a, b, c, wp.float64(x) + half, at_y)
+            keep_nearest(mesh, triangle, x, y, nearness, keys)
+            x += 1
+        y += 1
+
+
+@wp.func
 def draw_rows(
     mesh: ProjectedMesh, triangle: int, box: PixelBox, first_y: int, last_y: int, keys: wp.array(dtype=wp.int64)
 ):
@@ -194,7 +256,9 @@ def draw_rows(
     b = mesh.corners[mesh.first_vertex + face[1]]
     c = mesh.corners[mesh.first_vertex + face[2]]
     half = wp.float64(0.5)
-    if box.planar:
+    if box.planar and box.last_x - box.first_x + 1 >= WIDE:
+        draw_cut_rows(mesh, triangle, a, b, c, box, first_y, last_y, keys)
+    elif box.planar:
         # Not by ``range``, whose loop tests its step's sign each time: most triangles cover a pixel or two.
         y = int(first_y)
         while y <= last_y:

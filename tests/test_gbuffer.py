@@ -47,6 +47,27 @@ def test_no_cracks_in_a_closed_room() -> None:
         assert (gbuffer(camera, Object(shape="room", params={"segments": 13})).triangles >= 0).all()
 
 
+def test_triangles_of_every_shape_cover_the_pixels_inside() -> None:
+    camera = Camera(eye=(0, 0, 0), look_at=(0, 1, 0), fov_y=90, width=60, height=40)
+    x, y = np.meshgrid(np.arange(60) + 0.5, np.arange(40) + 0.5)
+    random = np.random.default_rng(5)
+    for turn in range(60):
+        # Of any size from two pixels to a thousand times the view, every other one flat, in front of the camera.
+        extent = 10.0 ** random.uniform(0.3, 4.5)
+        corners = random.uniform(-extent, extent, (3, 2)) * (1.0, 1e-3 if turn % 2 else 1.0) + random.uniform(5, 35, 2)
+        depth = random.uniform(1, 3, 3)
+        across, down = (corners[:, 0] / 20 - 1.5) * depth, (corners[:, 1] / 20 - 1.0) * depth
+        mesh = ldtrefl.Mesh(np.stack([across, depth, -down], axis=1), np.array([[0, 1, 2]]))
+        seen = gbuffer(camera, Object(mesh=mesh)).objects
+        beside = []
+        for p, q in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+            along = (q - p) / np.linalg.norm(q - p)
+            beside.append(along[0] * (y - p[1]) - along[1] * (x - p[0]))
+        inside = np.maximum(np.min(beside, axis=0), -np.max(beside, axis=0))  # pixels from the nearest edge
+        # Corners are kept in float32.
+        assert (seen[inside > 1e-6 * extent + 1e-4] == 0).all() and (seen[inside < -1e-6 * extent - 1e-4] == -1).all()
+
+
 def test_positions_and_normals() -> None:
     camera = CAMERAS["outside"]
     scene = Scene(camera=camera, objects=(Object(shape="sphere"),))
