@@ -6,6 +6,8 @@ length 1 along the view axis, so its ``t`` is the depth along that axis.
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 import warp as wp
 
@@ -44,6 +46,7 @@ def project_point(camera: CameraView, point: wp.vec3) -> wp.vec3:
     )
 
 
+@functools.lru_cache(maxsize=1)
 def camera_axes(camera: Camera) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Unit ``right``, ``down`` and ``forward`` in the world, float64."""
     forward = np.subtract(camera.look_at, camera.eye).astype(float)

@@ -33,6 +33,7 @@ class ObjectRecord:
     centre: wp.vec3  # bounding sphere, device space
     radius: float
     first_triangle: int  # number of triangle 0 among all objects' triangles
+    first_vertex: int  # and of vertex 0 among all objects' vertices
     triangle_count: int
     smooth: int
     fresnel: int
@@ -122,7 +123,7 @@ class DeviceScene:
         same_space = before is not None and np.array_equal(self.device_from_world, before.device_from_world)
         meshes = {id(entry.geometry.mesh): entry.geometry for entry in former}
         self.objects: list[DeviceObject] = []
-        first_triangle = 0
+        first_triangle = first_vertex = 0
         for index, source in enumerate(scene.objects):
             mesh = source.geometry
             if id(mesh) not in meshes:
@@ -130,9 +131,10 @@ class DeviceScene:
             if same_space and former[index].source is source:
                 self.objects.append(former[index])
             else:
-                self.objects.append(self._placed(index, source, meshes[id(mesh)], first_triangle))
+                self.objects.append(self._placed(index, source, meshes[id(mesh)], first_triangle, first_vertex))
             first_triangle += len(mesh.faces)
-        self.triangle_count = first_triangle
+            first_vertex += len(mesh.vertices)
+        self.triangle_count, self.vertex_count = first_triangle, first_vertex
         self.records = wp.array([entry.record for entry in self.objects], dtype=ObjectRecord, device=device)
         self.lighting = self._lighting(before)
         self.look_from(scene.camera)
@@ -173,7 +175,9 @@ class DeviceScene:
         up = np.asarray(camera.up, float)
         self.lighting.up = wp.vec3(*(up / np.linalg.norm(up)))
 
-    def _placed(self, index: int, source: Object, geometry: DeviceMesh, first_triangle: int) -> DeviceObject:
+    def _placed(
+        self, index: int, source: Object, geometry: DeviceMesh, first_triangle: int, first_vertex: int
+    ) -> DeviceObject:
         centre, half = geometry.mesh.unit_frame
         object_from_unit = np.diag([half, half, half, 1.0])
         object_from_unit[:3, 3] = centre
@@ -188,6 +192,7 @@ class DeviceScene:
         record.normal_from_unit = wp.mat33(normal_from_unit.astype(np.float32))
         record.centre, record.radius = _bounding_sphere(geometry.mesh, device_from_unit)
         record.first_triangle, record.triangle_count = first_triangle, len(geometry.mesh.faces)
+        record.first_vertex = first_vertex
         material = source.material
         # An object that only glows needs no normals.
         is_lit = max(*material.albedo, *material.mirror) > 0.0

@@ -334,13 +334,13 @@ def draw_large_triangles(
 
 
 @wp.func
-def object_of(first_triangles: wp.array(dtype=wp.int32), triangle: int) -> int:
+def object_of(objects: wp.array(dtype=ObjectRecord), triangle: int) -> int:
     """The object that holds the triangle of this number, by bisection."""
     low = int(0)
-    high = first_triangles.shape[0]
+    high = objects.shape[0]
     while high - low > 1:
         middle = (low + high) / 2
-        if first_triangles[middle] <= triangle:
+        if objects[middle].first_triangle <= triangle:
             low = middle
         else:
             high = middle
@@ -352,8 +352,6 @@ def resolve_pixels(
     first: int,
     # In:
     keys: wp.array(dtype=wp.int64),
-    first_triangles: wp.array(dtype=wp.int32),
-    first_vertices: wp.array(dtype=wp.int32),
     objects: wp.array(dtype=ObjectRecord),
     corners: wp.array(dtype=wp.vec3d),
     width: int,
@@ -371,13 +369,14 @@ def resolve_pixels(
         barycentrics_out[i] = wp.vec2(0.0, 0.0)
         return
     number = int(keys[i] & wp.int64(0x7FFFFFFF))
-    index = object_of(first_triangles, number)
-    triangle = number - first_triangles[index]
+    index = object_of(objects, number)
+    triangle = number - objects[index].first_triangle
     face = objects[index].faces[triangle]
+    first_vertex = objects[index].first_vertex
     tri = homogeneous_triangle(
-        homogeneous(corners[first_vertices[index] + face[0]]),
-        homogeneous(corners[first_vertices[index] + face[1]]),
-        homogeneous(corners[first_vertices[index] + face[2]]),
+        homogeneous(corners[first_vertex + face[0]]),
+        homogeneous(corners[first_vertex + face[1]]),
+        homogeneous(corners[first_vertex + face[2]]),
     )
     x, y = wp.float64(i % width) + wp.float64(0.5), wp.float64(i / width) + wp.float64(0.5)
     at = perspective_weights(tri, x, y)
@@ -479,7 +478,7 @@ class Drawing:
     def empty(cls, scene: DeviceScene, camera: Camera) -> Drawing:
         """Nothing drawn yet."""
         keys = wp.zeros(camera.width * camera.height, dtype=wp.int64, device=scene.device)
-        return cls(keys, wp.empty(_first_vertices(scene)[-1], dtype=wp.vec3d, device=scene.device))
+        return cls(keys, wp.empty(scene.vertex_count, dtype=wp.vec3d, device=scene.device))
 
     def over(self) -> Drawing:
         """A copy to draw other objects over."""
@@ -487,23 +486,24 @@ class Drawing:
 
     def add(self, scene: DeviceScene, camera: Camera, numbers: Iterable[int]) -> None:
         """Draw the objects of these numbers."""
-        device, first_vertices, from_world = scene.device, _first_vertices(scene), pixels_from_world(camera)
+        device, from_world = scene.device, pixels_from_world(camera)
         for entry in (scene.objects[number] for number in numbers):
             mesh, rows = entry.geometry, [wp.vec4d(*row) for row in from_world @ entry.world_from_unit]
-            first_vertex = first_vertices[entry.index]
-            inputs = [mesh.vertices, *rows, first_vertex, self.corners]
+            inputs = [mesh.vertices, *rows, entry.record.first_vertex, self.corners]
             launch.launch(project_vertices, len(mesh.vertices), inputs, device)
             triangles = len(mesh.faces)
             projected = ProjectedMesh()
             projected.faces, projected.corners = mesh.faces, self.corners
-            projected.first_vertex, projected.first_triangle = first_vertex, entry.record.first_triangle
+            projected.first_vertex = entry.record.first_vertex
+            projected.first_triangle = entry.record.first_triangle
             projected.width, projected.height = camera.width, camera.height
             counts = wp.zeros(chunk_count(triangles) + 1, dtype=wp.int32, device=device)
             listed = wp.empty(triangles, dtype=wp.int32, device=device)
             launch_chunks(draw_small_triangles, triangles, [projected, self.keys, counts, listed], device)
-            large = gather_lists(listed, counts)
-            bands = large.shape[0] * -(-camera.height // int(BAND))
-            launch.launch(draw_large_triangles, bands, [projected, large, self.keys], device)
+            if counts.numpy().any():
+                large = gather_lists(listed, counts)
+                bands = large.shape[0] * -(-camera.height // int(BAND))
+                launch.launch(draw_large_triangles, bands, [projected, large, self.keys], device)
 
     def resolved(self, scene: DeviceScene, camera: Camera) -> GBuffer:
         """What each pixel sees."""
@@ -514,20 +514,13 @@ class Drawing:
         view.reflector = wp.zeros(pixels, dtype=wp.uint8, device=device)
         view.camera = camera_view(camera, scene.device_from_world)
         if scene.objects:
-            firsts = wp.array([entry.record.first_triangle for entry in scene.objects], dtype=wp.int32, device=device)
-            starts = wp.array(_first_vertices(scene)[:-1], dtype=wp.int32, device=device)
-            inputs = [self.keys, firsts, starts, scene.records, self.corners, camera.width]
+            inputs = [self.keys, scene.records, self.corners, camera.width]
             outputs = [view.object, view.triangle, view.barycentrics, view.reflector]
             launch.launch(resolve_pixels, pixels, [*inputs, *outputs], device)
         else:
             view.object.fill_(-1)
             view.triangle.fill_(-1)
         return GBuffer(scene, camera, view)
-
-
-def _first_vertices(scene: DeviceScene) -> list[int]:
-    """Each object's first vertex among all objects', and the total."""
-    return np.cumsum([0] + [len(entry.geometry.vertices) for entry in scene.objects]).tolist()
 
 
 def draw_gbuffer(scene: DeviceScene, camera: Camera, *, without: int = -1) -> GBuffer:
