@@ -158,11 +158,13 @@ def surface_at(objects: wp.array(dtype=ObjectRecord), index: int, triangle: int,
     surface = Surface()
     surface.position = wp.transform_point(objects[index].device_from_unit, w * a + u * b + v * c)
 
-    # Turn the facet towards the viewer, and the interpolated normal to the facet's side.
-    facet = wp.normalize(objects[index].normal_from_unit * wp.normalize(wp.cross(b - a, c - a)))
-    if wp.dot(facet, view) > 0.0:
-        facet = -facet
-    normal = facet
+    # Turn the facet towards the viewer, and the interpolated normal to the facet's side: for that no length matters.
+    across = wp.cross(b - a, c - a)
+    away = objects[index].normal_from_unit * across
+    if wp.dot(away, view) > 0.0:
+        across = -across
+        away = -away
+    normal = wp.vec3(0.0)
     if objects[index].smooth != 0:
         interpolated = (
             w * objects[index].normals[corners[0]]
@@ -170,11 +172,14 @@ def surface_at(objects: wp.array(dtype=ObjectRecord), index: int, triangle: int,
             + v * objects[index].normals[corners[2]]
         )
         if wp.dot(interpolated, interpolated) > SMALLEST_NORMAL:
-            normal = wp.normalize(objects[index].normal_from_unit * wp.normalize(interpolated))
-            if wp.dot(normal, facet) < 0.0:
+            normal = objects[index].normal_from_unit * wp.normalize(interpolated)
+            if wp.dot(normal, away) < 0.0:
                 normal = -normal
-    surface.facet = facet
-    surface.normal = normal
+    # The facet's own normal is worked out where it is used.
+    if normal == wp.vec3(0.0):
+        normal = objects[index].normal_from_unit * wp.normalize(across)
+    surface.facet = wp.normalize(objects[index].normal_from_unit * wp.normalize(across))
+    surface.normal = wp.normalize(normal)
 
     # Find the part of the mesh that holds the triangle, and look up its colour.
     part = int(0)
