@@ -52,10 +52,12 @@ SEARCH_CELLS = """
 #if defined(__CUDA_ARCH__)
     #define IN_LINE
     #define OUT_OF_LINE
+    #define AT_ONCE
 #else
     #pragma clang fp contract(fast)
     #define IN_LINE __attribute__((always_inline))
     #define OUT_OF_LINE __attribute__((noinline))
+    #define AT_ONCE _Pragma("clang loop vectorize(enable) unroll(disable)")
 #endif
     using vec3 = wp::vec_t<3, float>;
     struct Met { float t; int triangle, steps, kind; float u, v; vec3 normal; };
@@ -228,7 +230,7 @@ SEARCH_CELLS = """
             }
 
             unsigned char is_met[lanes];
-            for (int i = 0; i < lanes; ++i) is_met[i] = nearest[i] < to ? 1 : 0;
+            AT_ONCE for (int i = 0; i < lanes; ++i) is_met[i] = nearest[i] < to ? 1 : 0;
             unsigned long long left = packed(is_met);
             if (left) {
                 int lane = lowest_byte(left);
