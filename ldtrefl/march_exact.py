@@ -139,8 +139,9 @@ SEARCH_CELLS = """
     float t = 0.0f;
     int steps = 0;
     while (t <= t_end) {
-        const bool is_occupied = leaps[cell] == 0;
-        const float leap = is_occupied ? 1.0f : (float)leaps[cell];
+        const int empty = leaps[cell];
+        const int cells = empty > 0 ? empty : 1;
+        const float leap = (float)cells;
         ++steps;
 
         // The cube of ``leap`` cells ahead is left through the nearest of its far sides.
@@ -149,7 +150,7 @@ SEARCH_CELLS = """
         const float tz = (place[2] + leap) * turned_inverse[2] + offset[2];
         const float t_out = greater(lesser(lesser(tx, ty), tz), t);
 
-        if (is_occupied) {
+        if (empty == 0) {
             // In coordinates from the cell's corner, t from where the ray enters it.
             float local[3];
             #pragma unroll
@@ -255,13 +256,12 @@ SEARCH_CELLS = """
 
         // Go on where the ray leaves the cube.
         t = t_out;
-        const int axis = tx <= ty && tx <= tz ? 0 : ty <= tz ? 1 : 2;
-        if (leap == 1.0f) {
-            if (axis == 0) {
+        if (cells == 1) {
+            if (tx <= ty && tx <= tz) {
                 place[0] += 1.0f;
                 cell += step[0];
                 if (place[0] >= side[0]) break;
-            } else if (axis == 1) {
+            } else if (ty <= tz) {
                 place[1] += 1.0f;
                 cell += step[1];
                 if (place[1] >= side[1]) break;
@@ -272,6 +272,7 @@ SEARCH_CELLS = """
             }
         } else {
             // Beside the axis of that side, in the cell that the ray is in then.
+            const int axis = tx <= ty && tx <= tz ? 0 : ty <= tz ? 1 : 2;
             cell = first;
             #pragma unroll
             for (int k = 0; k < 3; ++k) {
