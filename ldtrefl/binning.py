@@ -1,7 +1,7 @@
 """Sorting items into bins by number, and listing some of many items.
 
-*Bins*: count, prefix sum, place. Stable and the same for any number of threads: each part of a launch owns a run of
-bins and goes through the items in order (``launch.launch_parts``). On CUDA the order within a bin is left to chance.
+*Bins*: count, prefix sum, place. Stable and the same for any number of threads: the CPU counts the items
+in order on one. On CUDA the order within a bin is left to chance.
 
 *Chunks*: a kernel that keeps few of its items goes through them in chunks, each of which lists what it keeps where the
 chunk's own items stand; the lists are then joined. Only the chunks' counts are summed, not a mark for every item.
@@ -22,34 +22,28 @@ CHUNK = wp.constant(1024)
 
 @launch.kernel
 def count_items(
-    part: int,
+    first: int,
     # In:
     numbers: wp.array(dtype=wp.int32),
-    bins_per_part: int,
     # Out:
     counts_out: wp.array(dtype=wp.int32),
+    ranks_out: wp.array(dtype=wp.int32),  # in their bins
 ):
-    i = wp.tid()
-    number = numbers[i]
-    if number / bins_per_part == part:
-        wp.atomic_add(counts_out, number, 1)
+    i = first + wp.tid()
+    ranks_out[i] = wp.atomic_add(counts_out, numbers[i], 1)
 
 
 @launch.kernel
 def place_items(
-    part: int,
+    first: int,
     # In:
     numbers: wp.array(dtype=wp.int32),
-    bins_per_part: int,
     start: wp.array(dtype=wp.int32),
-    # Out:
-    filled_out: wp.array(dtype=wp.int32),
-    places_out: wp.array(dtype=wp.int32),
+    # In: ranks in their bins; out: places
+    places: wp.array(dtype=wp.int32),
 ):
-    i = wp.tid()
-    number = numbers[i]
-    if number / bins_per_part == part:
-        places_out[i] = start[number] + wp.atomic_add(filled_out, number, 1)
+    i = first + wp.tid()
+    places[i] += start[numbers[i]]
 
 
 @launch.kernel
@@ -91,14 +85,11 @@ def bin_items(numbers: wp.array, bins: int, device: wp.Device) -> tuple[wp.array
         places: (items,) int32, the place of each item.
     """
     items = numbers.shape[0]
-    parts = launch.part_count(count_items, items, device)
-    bins_per_part = -(-bins // parts)
     counts = wp.zeros(bins + 1, dtype=wp.int32, device=device)
-    launch.launch_parts(count_items, items, [numbers, bins_per_part, counts], device, parts)
-    start, _ = exclusive_scan(counts)
-    counts.zero_()
     places = wp.empty(items, dtype=wp.int32, device=device)
-    launch.launch_parts(place_items, items, [numbers, bins_per_part, start, counts, places], device, parts)
+    launch.launch_in_order(count_items, items, [numbers, counts, places], device)
+    start, _ = exclusive_scan(counts)
+    launch.launch(place_items, items, [numbers, start, places], device)
     return start, places
 
 

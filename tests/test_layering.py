@@ -15,6 +15,7 @@ BOTTOM_TO_TOP = (
     "native",
     "skips",
     "cache",
+    "crew",
     "launch",
     "image",
     "mesh",
