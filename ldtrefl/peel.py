@@ -4,7 +4,7 @@ Depth peeling (Zhang, Hsieh and Shen, section 3.4) draws the object once per lay
 fragments in one pass: every triangle is rasterised exactly along the three axes (``raster.py``), all its fragments are
 kept, put into their texels and sorted by depth. Any number of layers; memory follows the fragments.
 
-    snap vertices -> count a triangle's fragments -> prefix sum -> fill -> into texels -> sort each texel
+    snap vertices -> count fragments, by runs of triangles -> prefix sum -> fill -> into texels -> sort each texel
 
 Every step writes places of its own, and fragments are sorted by (depth, triangle), so the bits are the same for any
 number of threads.
@@ -27,6 +27,10 @@ from ldtrefl.raster import FixedTriangle, cover, fixed_triangle, interpolate, sn
 
 INSERTION_LIMIT = wp.constant(24)
 """Fragments in a texel up to which insertion sort beats heap sort."""
+
+RUNS = 8192
+"""Runs of triangles, at most, whose fragments are counted together: threads can share so many, and their sums take no
+time."""
 
 
 @wp.struct
@@ -76,21 +80,33 @@ def count_fragments(
     first: int,
     # In:
     target: PeelTarget,
-    # Out:
-    counts_out: wp.array(dtype=wp.int32),
+    length: int,  # triangles in a run
+    # Out, per run: fragments; triangles that give some, and their list
+    counts_out: wp.array(dtype=wp.int64),
+    givers_out: wp.array(dtype=wp.int32),
+    giver_out: wp.array(dtype=wp.int32),
 ):
-    triangle = first + wp.tid()
-    corners = target.faces[triangle]
-    a, b, c = target.fixed[corners[0]], target.fixed[corners[1]], target.fixed[corners[2]]
-    count = int(0)
-    for axis in range(3):
-        tri = projected(target, a, b, c, axis)
-        if tri.area != wp.int64(0):
-            for v in range(tri.first_v, tri.last_v + 1):
-                for u in range(tri.first_u, tri.last_u + 1):
-                    if cover(tri, u, v).covered:
-                        count += 1
-    counts_out[triangle] = count
+    run = first + wp.tid()
+    begin = length * run
+    total = wp.int64(0)
+    givers = int(0)
+    for triangle in range(begin, wp.min(begin + length, target.faces.shape[0])):
+        corners = target.faces[triangle]
+        a, b, c = target.fixed[corners[0]], target.fixed[corners[1]], target.fixed[corners[2]]
+        count = int(0)
+        for axis in range(3):
+            tri = projected(target, a, b, c, axis)
+            if tri.area != wp.int64(0):
+                for v in range(tri.first_v, tri.last_v + 1):
+                    for u in range(tri.first_u, tri.last_u + 1):
+                        if cover(tri, u, v).covered:
+                            count += 1
+        if count > 0:
+            total += wp.int64(count)
+            giver_out[begin + givers] = triangle
+            givers += 1
+    counts_out[run] = total
+    givers_out[run] = givers
 
 
 @launch.kernel
@@ -98,31 +114,34 @@ def fill_fragments(
     first: int,
     # In:
     target: PeelTarget,
-    places: wp.array(dtype=wp.int32),
+    length: int,
+    places: wp.array(dtype=wp.int64),
+    givers: wp.array(dtype=wp.int32),
+    giver: wp.array(dtype=wp.int32),
     # Out:
     texel_out: wp.array(dtype=wp.int32),
     depth_out: wp.array(dtype=wp.float32),
     reference_out: wp.array(dtype=wp.int32),
 ):
-    triangle = first + wp.tid()
-    place = int(places[triangle])
-    if place == places[triangle + 1]:
-        return
-    corners = target.faces[triangle]
-    a, b, c = target.fixed[corners[0]], target.fixed[corners[1]], target.fixed[corners[2]]
-    for axis in range(3):
-        tri = projected(target, a, b, c, axis)
-        if tri.area != wp.int64(0):
-            columns = target.size[(axis + 1) % 3]
-            for v in range(tri.first_v, tri.last_v + 1):
-                for u in range(tri.first_u, tri.last_u + 1):
-                    at = cover(tri, u, v)
-                    if at.covered:
-                        texel_out[place] = target.first_texel[axis] + v * columns + u
-                        depth_out[place] = interpolate(tri, at, unsnap(a[axis]), unsnap(b[axis]), unsnap(c[axis]))
-                        # Counter-clockwise in (u, v) is a normal up the axis.
-                        reference_out[place] = 2 * triangle + 1 - tri.flipped
-                        place += 1
+    run = first + wp.tid()
+    place = int(places[run])
+    for k in range(givers[run]):
+        triangle = giver[length * run + k]
+        corners = target.faces[triangle]
+        a, b, c = target.fixed[corners[0]], target.fixed[corners[1]], target.fixed[corners[2]]
+        for axis in range(3):
+            tri = projected(target, a, b, c, axis)
+            if tri.area != wp.int64(0):
+                columns = target.size[(axis + 1) % 3]
+                for v in range(tri.first_v, tri.last_v + 1):
+                    for u in range(tri.first_u, tri.last_u + 1):
+                        at = cover(tri, u, v)
+                        if at.covered:
+                            texel_out[place] = target.first_texel[axis] + v * columns + u
+                            depth_out[place] = interpolate(tri, at, unsnap(a[axis]), unsnap(b[axis]), unsnap(c[axis]))
+                            # Counter-clockwise in (u, v) is a normal up the axis.
+                            reference_out[place] = 2 * triangle + 1 - tri.flipped
+                            place += 1
 
 
 @launch.kernel
@@ -260,19 +279,23 @@ class Rasteriser:
         self._target.fixed = snapped_vertices(geometry, frame)
         self._target.faces = geometry.faces
         self._target.size, self._target.first_texel = wp.vec3i(*frame.size), wp.vec3i(*frame.first_texels[:3])
-        counts = wp.zeros(self._triangles + 1, dtype=wp.int32, device=self._device)
-        launch.launch(count_fragments, self._triangles, [self._target, counts], self._device)
-        total = int(counts.numpy().sum(dtype=np.int64))
-        if total > np.iinfo(np.int32).max:
-            raise InputError(f"{total} fragments at resolution {max(frame.size)}; a lower resolution is needed")
+        self._length = -(-self._triangles // RUNS)
+        self._runs = -(-self._triangles // self._length)
+        counts = wp.zeros(self._runs + 1, dtype=wp.int64, device=self._device)
+        self._givers = wp.empty(self._runs, dtype=wp.int32, device=self._device)
+        self._giver = wp.empty(self._triangles, dtype=wp.int32, device=self._device)
+        outputs = [counts, self._givers, self._giver]
+        launch.launch(count_fragments, self._runs, [self._target, self._length, *outputs], self._device)
         self._places, self.count = exclusive_scan(counts)
+        if self.count > np.iinfo(np.int32).max:
+            raise InputError(f"{self.count} fragments at resolution {max(frame.size)}; a lower resolution is needed")
 
     def fragments(self) -> Fragments:
         """All fragments, by triangle."""
         texel, reference = (wp.empty(self.count, dtype=wp.int32, device=self._device) for _ in range(2))
         depth = wp.empty(self.count, dtype=wp.float32, device=self._device)
-        inputs = [self._target, self._places, texel, depth, reference]
-        launch.launch(fill_fragments, self._triangles, inputs, self._device)
+        inputs = [self._target, self._length, self._places, self._givers, self._giver]
+        launch.launch(fill_fragments, self._runs, [*inputs, texel, depth, reference], self._device)
         return Fragments(texel, depth, reference)
 
 
