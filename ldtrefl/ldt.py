@@ -274,7 +274,7 @@ class LayeredDepthTexture:
 def _shows_backs(grid: Grid) -> bool:
     """Whether rays from all around meet backs of a surface that is closed as a whole: a part is wound the other way."""
     device = grid.view.vertices.device
-    origins, directions = (wp.array(rays, dtype=wp.vec3, device=device) for rays in _rays_all_around())
+    origins, directions = _rays_all_around(str(device))
     views = wp.array([grid.view], dtype=TRACERS["exact"].view, device=device)
     hits = trace_rays(TRACERS["exact"], views, (np.zeros(3), 1.0), origins, directions)
     towards = (hits.normal.numpy() * directions.numpy()).sum(axis=1)
@@ -282,14 +282,14 @@ def _shows_backs(grid: Grid) -> bool:
 
 
 @functools.cache
-def _rays_all_around() -> tuple[np.ndarray, np.ndarray]:
-    """(n, 3) float32 origins on a sphere about the unit cube and unit directions into it."""
+def _rays_all_around(device: str) -> tuple[wp.array, wp.array]:
+    """(n,) vec3 origins on a sphere about the unit cube and unit directions into it."""
     rng = np.random.default_rng(0)
     origins = rng.normal(size=(RAYS_ALL_AROUND, 3))
     origins *= 4.0 / np.linalg.norm(origins, axis=1, keepdims=True)
     directions = rng.uniform(-1.0, 1.0, (RAYS_ALL_AROUND, 3)) - origins
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    return origins.astype(np.float32), directions.astype(np.float32)
+    return wp.array(origins, dtype=wp.vec3, device=device), wp.array(directions, dtype=wp.vec3, device=device)
 
 
 def _check(frame: TexelFrame, start: Any, depth: Any, reference: Any, triangles: int, path: Any) -> None:
