@@ -1,7 +1,7 @@
 """Sorting items into bins by number, and listing some of many items.
 
-*Bins*: count, prefix sum, place. Stable and the same for any number of threads: the CPU counts the items
-in order on one. On CUDA the order within a bin is left to chance.
+*Bins*: count and rank, prefix sum; item i then goes to ``start[number[i]] + rank[i]``. Stable and the same for any
+number of threads: the CPU counts the items in order on one. On CUDA the order within a bin is left to chance.
 
 *Chunks*: a kernel that keeps few of its items goes through them in chunks, each of which lists what it keeps where the
 chunk's own items stand; the lists are then joined. Only the chunks' counts are summed, not a mark for every item.
@@ -31,19 +31,6 @@ def count_items(
 ):
     i = first + wp.tid()
     ranks_out[i] = wp.atomic_add(counts_out, numbers[i], 1)
-
-
-@launch.kernel
-def place_items(
-    first: int,
-    # In:
-    numbers: wp.array(dtype=wp.int32),
-    start: wp.array(dtype=wp.int32),
-    # In: ranks in their bins; out: places
-    places: wp.array(dtype=wp.int32),
-):
-    i = first + wp.tid()
-    places[i] += start[numbers[i]]
 
 
 @launch.kernel
@@ -82,15 +69,14 @@ def bin_items(numbers: wp.array, bins: int, device: wp.Device) -> tuple[wp.array
 
     Returns:
         start: (bins + 1,) int32, first place of each bin.
-        places: (items,) int32, the place of each item.
+        ranks: (items,) int32, the place of each item in its bin.
     """
     items = numbers.shape[0]
     counts = wp.zeros(bins + 1, dtype=wp.int32, device=device)
-    places = wp.empty(items, dtype=wp.int32, device=device)
-    launch.launch_in_order(count_items, items, [numbers, counts, places], device)
+    ranks = wp.empty(items, dtype=wp.int32, device=device)
+    launch.launch_in_order(count_items, items, [numbers, counts, ranks], device)
     start, _ = exclusive_scan(counts)
-    launch.launch(place_items, items, [numbers, start, places], device)
-    return start, places
+    return start, ranks
 
 
 def gather_lists(lists: wp.array, counts: wp.array) -> wp.array:

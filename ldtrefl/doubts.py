@@ -79,14 +79,16 @@ def sort_patches(
     # In:
     patches: wp.array(dtype=Piece),
     texel: wp.array(dtype=wp.int32),
-    places: wp.array(dtype=wp.int32),
+    start: wp.array(dtype=wp.int32),
+    ranks: wp.array(dtype=wp.int32),
     # Out:
     patches_out: wp.array(dtype=Piece),
     texel_out: wp.array(dtype=wp.int32),
 ):
     i = first + wp.tid()
-    patches_out[places[i]] = patches[i]
-    texel_out[places[i]] = texel[i]
+    place = start[texel[i]] + ranks[i]
+    patches_out[place] = patches[i]
+    texel_out[place] = texel[i]
 
 
 @kernel
@@ -215,9 +217,9 @@ def doubts_of(survey: Survey, largest_turn: float) -> Doubts:
     frame, (patches, texel) = survey.frame, survey.patches()
     device, count = patches.device, patches.shape[0]
     maps = PatchMap()
-    maps.start, places = bin_items(texel, frame.first_texels[3], device)
+    maps.start, ranks = bin_items(texel, frame.first_texels[3], device)
     maps.patches, maps.texel = wp.empty_like(patches), wp.empty_like(texel)
-    launch(sort_patches, count, [patches, texel, places, maps.patches, maps.texel], device)
+    launch(sort_patches, count, [patches, texel, maps.start, ranks, maps.patches, maps.texel], device)
     maps.size, maps.first_texel = wp.vec3i(*frame.size), wp.vec3i(*frame.first_texels[:3])
     maps.cells_per_texel, maps.cells = survey.cells_per_texel, survey.cells
     doubtful = wp.empty(count, dtype=wp.uint8, device=device)

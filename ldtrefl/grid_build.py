@@ -296,12 +296,14 @@ def put_in_order(
     first: int,
     # In:
     item: wp.array(dtype=wp.int32),
-    places: wp.array(dtype=wp.int32),
+    part: wp.array(dtype=wp.int32),
+    start: wp.array(dtype=wp.int32),
+    ranks: wp.array(dtype=wp.int32),
     # Out:
     item_out: wp.array(dtype=wp.int32),
 ):
     i = first + wp.tid()
-    item_out[places[i]] = item[i]
+    item_out[start[part[i]] + ranks[i]] = item[i]
 
 
 @launch.kernel
@@ -552,9 +554,9 @@ def _built(target: Any, geometry: DeviceMesh, items: wp.array, count: int) -> tu
     launch.launch(list_cells, count, [target, items, masks, places, number, part, item], device)
 
     # Sort them by cell, and by where they lie in it.
-    start, places = bin_items(part, 2 * occupied * int(SUBCELLS), device)
+    start, ranks = bin_items(part, 2 * occupied * int(SUBCELLS), device)
     ordered = wp.empty_like(item)
-    launch.launch(put_in_order, records, [item, places, ordered], device)
+    launch.launch(put_in_order, records, [item, part, start, ranks, ordered], device)
 
     # Lay out blocks of records, and the boxes about them.
     cell = wp.empty(occupied, dtype=wp.int32, device=device)

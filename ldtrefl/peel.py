@@ -148,7 +148,9 @@ def fill_fragments(
 def scatter_fragments(
     first: int,
     # In:
-    places: wp.array(dtype=wp.int32),
+    texel: wp.array(dtype=wp.int32),
+    start: wp.array(dtype=wp.int32),
+    ranks: wp.array(dtype=wp.int32),
     depth: wp.array(dtype=wp.float32),
     reference: wp.array(dtype=wp.int32),
     # Out:
@@ -156,8 +158,9 @@ def scatter_fragments(
     reference_out: wp.array(dtype=wp.int32),
 ):
     i = first + wp.tid()
-    depth_out[places[i]] = depth[i]
-    reference_out[places[i]] = reference[i]
+    place = start[texel[i]] + ranks[i]
+    depth_out[place] = depth[i]
+    reference_out[place] = reference[i]
 
 
 @wp.func
@@ -327,9 +330,11 @@ class Maps:
 def sort_fragments(frame: TexelFrame, raw: Fragments) -> Maps:
     """Put fragments into their texels and sort each texel."""
     texels, total, device = frame.first_texels[3], raw.texel.shape[0], raw.texel.device
-    start, places = bin_items(raw.texel, texels, device)
+    start, ranks = bin_items(raw.texel, texels, device)
     depth, reference = wp.empty_like(raw.depth), wp.empty_like(raw.reference)
-    launch.launch(scatter_fragments, total, [places, raw.depth, raw.reference, depth, reference], device)
+    launch.launch(
+        scatter_fragments, total, [raw.texel, start, ranks, raw.depth, raw.reference, depth, reference], device
+    )
     return sorted_maps(start, depth, reference)
 
 
