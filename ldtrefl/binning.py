@@ -61,7 +61,9 @@ def exclusive_scan(counts: wp.array) -> tuple[wp.array, int]:
     """(prefix sums, their last): ``counts`` ends with a 0 that the total takes the place of."""
     sums = wp.empty_like(counts)
     wp.utils.array_scan(counts, sums, inclusive=False)
-    return sums, int(sums[-1:].numpy()[0])
+    # On the CPU the array is read where it lies; from CUDA only its last number comes.
+    last = sums if sums.device.is_cpu else sums[-1:]
+    return sums, int(last.numpy()[-1])
 
 
 def bin_items(numbers: wp.array, bins: int, device: wp.Device) -> tuple[wp.array, wp.array]:
