@@ -26,7 +26,7 @@ import xxhash
 from ldtrefl.errors import InputError
 from ldtrefl.files import writable_folder, written_whole
 
-FORMAT = 1
+FORMAT = 2
 """Goes up when what files hold changes: old ones are then not found."""
 
 LIMIT = 1 << 30
