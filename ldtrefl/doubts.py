@@ -23,18 +23,25 @@ LARGEST_END = wp.constant(0.25)
 edge: with more, fast patches stuck out over the edges of a box."""
 
 
-POINTS = wp.constant(5)
-"""Points of a patch, which is smaller than a cell of the survey, whose cells it is said to lie in."""
+@wp.struct
+class PatchCells:
+    """The cells of the survey in the box about a patch, which is smaller than a cell."""
+
+    first: wp.vec3i
+    last: wp.vec3i
 
 
 @wp.func
-def cell_of_point(cells: wp.vec3i, piece: Piece, k: int) -> int:
-    """The cell that holds the ``k``-th point of a patch: its corners and its middle."""
-    along_u, along_v = 0.5, 0.5
-    if k < 4:
-        along_u, along_v = float(k % 2), float(k / 2)
-    p = piece.corner + along_u * piece.edge_u + along_v * piece.edge_v
-    return number_of_cell(cells, cell_number(p[0], cells[0]), cell_number(p[1], cells[1]), cell_number(p[2], cells[2]))
+def cells_of_patch(cells: wp.vec3i, piece: Piece) -> PatchCells:
+    """The cells in the box about a patch."""
+    b, c = piece.corner + piece.edge_u, piece.corner + piece.edge_v
+    low = wp.min(wp.min(piece.corner, b), wp.min(c, b + piece.edge_v))
+    high = wp.max(wp.max(piece.corner, b), wp.max(c, b + piece.edge_v))
+    box = PatchCells()
+    for axis in range(3):
+        box.first[axis] = cell_number(low[axis], cells[axis])
+        box.last[axis] = cell_number(high[axis], cells[axis])
+    return box
 
 
 @wp.struct
@@ -126,8 +133,11 @@ def find_doubts(
         doubtful = doubtful or following < 0 or (following == 0 and not may_end)
     patch_out[i] = wp.where(doubtful, wp.uint8(1), wp.uint8(0))
     if doubtful:
-        for k in range(POINTS):
-            cell_out[cell_of_point(maps.cells, piece, k)] = wp.uint8(1)
+        box = cells_of_patch(maps.cells, piece)
+        for z in range(box.first[2], box.last[2] + 1):
+            for y in range(box.first[1], box.last[1] + 1):
+                for x in range(box.first[0], box.last[0] + 1):
+                    cell_out[number_of_cell(maps.cells, x, y, z)] = wp.uint8(1)
 
 
 @kernel
@@ -166,17 +176,21 @@ def list_sure(
     begin = CHUNK * chunk
     count = int(0)
     for i in range(begin, wp.min(begin + CHUNK, patches.shape[0])):
-        piece = patches[i]
+        box = cells_of_patch(cells, patches[i])
         is_sure = bool(True)
         if doubtful.shape[0] > 0:
-            for k in range(POINTS):
-                if doubtful[cell_of_point(cells, piece, k)] != wp.uint8(0):
-                    is_sure = False
+            for z in range(box.first[2], box.last[2] + 1):
+                for y in range(box.first[1], box.last[1] + 1):
+                    for x in range(box.first[0], box.last[0] + 1):
+                        if doubtful[number_of_cell(cells, x, y, z)] != wp.uint8(0):
+                            is_sure = False
         if is_sure:
             list_out[begin + count] = -1 - i
             count += 1
-            for k in range(POINTS):
-                touched_out[cell_of_point(cells, piece, k)] = wp.uint8(1)
+            for z in range(box.first[2], box.last[2] + 1):
+                for y in range(box.first[1], box.last[1] + 1):
+                    for x in range(box.first[0], box.last[0] + 1):
+                        touched_out[number_of_cell(cells, x, y, z)] = wp.uint8(1)
     count_out[chunk] = count
 
 
@@ -226,5 +240,8 @@ def doubts_of(survey: Survey, largest_turn: float) -> Doubts:
     cell_count = survey.cells[0] * survey.cells[1] * survey.cells[2]
     cells, near = (wp.zeros(cell_count, dtype=wp.uint8, device=device) for _ in range(2))
     launch(find_doubts, count, [maps, largest_turn, doubtful, cells], device)
+    doubts = int(np.count_nonzero(doubtful.numpy()))
+    if doubts == 0:
+        return Doubts(maps.patches, 0.0, wp.empty(0, dtype=wp.uint8, device=device), near, survey.cells)
     launch(find_near, cell_count, [cells, survey.cells, near], device)
-    return Doubts(maps.patches, int(np.count_nonzero(doubtful.numpy())) / count, cells, near, survey.cells)
+    return Doubts(maps.patches, doubts / count, cells, near, survey.cells)

@@ -34,9 +34,10 @@ SIDES = wp.constant(6)
 """Numbers in a box: low and high along x, y, z."""
 
 TRIANGLE = wp.constant(-1)
-"""Kind of a record that is a triangle; a patch's is the axis of its map, and ``LARGE`` if its triangle is larger than
-its texel: that one's barycentrics are looked for, while of a small one any of its points will do."""
+"""Kind of a record that is a triangle; a patch's is the axis of its map, 0 to 2."""
 LARGE = wp.constant(4)
+"""Added to the kind of a patch whose triangle is larger than its texel: the barycentrics of a hit are then looked for,
+while of a small triangle any of its points will do."""
 
 
 @wp.struct
