@@ -44,6 +44,15 @@ def cells_of_patch(cells: wp.vec3i, piece: Piece) -> PatchCells:
     return box
 
 
+@wp.func
+def crosses_cell(piece: Piece, x: int, y: int, z: int) -> bool:
+    """Whether the plane of a patch crosses a cell."""
+    normal = wp.cross(piece.edge_u, piece.edge_v)
+    middle = wp.vec3(float(x) + 0.5, float(y) + 0.5, float(z) + 0.5)
+    reach = 0.5 * (wp.abs(normal[0]) + wp.abs(normal[1]) + wp.abs(normal[2]))
+    return wp.abs(wp.dot(normal, middle - piece.corner)) <= reach
+
+
 @wp.struct
 class PatchMap:
     """Patches, texel by texel."""
@@ -190,7 +199,8 @@ def list_sure(
             for z in range(box.first[2], box.last[2] + 1):
                 for y in range(box.first[1], box.last[1] + 1):
                     for x in range(box.first[0], box.last[0] + 1):
-                        touched_out[number_of_cell(cells, x, y, z)] = wp.uint8(1)
+                        if crosses_cell(patches[i], x, y, z):
+                            touched_out[number_of_cell(cells, x, y, z)] = wp.uint8(1)
     count_out[chunk] = count
 
 
