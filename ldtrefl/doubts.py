@@ -16,7 +16,8 @@ import warp as wp
 from ldtrefl.binning import CHUNK, bin_items, chunk_count, gather_lists, launch_chunks
 from ldtrefl.grid import cell_number, number_of_cell
 from ldtrefl.launch import kernel, launch
-from ldtrefl.patches import FACING, Piece, Survey
+from ldtrefl.patches import FACING, Survey
+from ldtrefl.pieces import Piece, high_corner, low_corner
 
 LARGEST_END = wp.constant(0.25)
 """|n . axis| above ``FACING`` up to which a missing neighbour can be a surface that goes on in another map, and not an
@@ -34,9 +35,7 @@ class PatchCells:
 @wp.func
 def cells_of_patch(cells: wp.vec3i, piece: Piece) -> PatchCells:
     """The cells in the box about a patch."""
-    b, c = piece.corner + piece.edge_u, piece.corner + piece.edge_v
-    low = wp.min(wp.min(piece.corner, b), wp.min(c, b + piece.edge_v))
-    high = wp.max(wp.max(piece.corner, b), wp.max(c, b + piece.edge_v))
+    low, high = low_corner(piece), high_corner(piece)
     box = PatchCells()
     for axis in range(3):
         box.first[axis] = cell_number(low[axis], cells[axis])

@@ -28,7 +28,8 @@ from ldtrefl.grid import (
     cell_number,
     number_of_cell,
 )
-from ldtrefl.patches import PATCH_MARGIN, Piece, Survey
+from ldtrefl.patches import PATCH_MARGIN, Survey
+from ldtrefl.pieces import CELL_MARGIN, SUBCELLS, Piece, high_corner, low_corner, subcell, touches_cell
 
 Quality = Literal["fast", "balanced", "exact"]
 
@@ -58,8 +59,6 @@ FEW_TRIANGLES = 50_000
 """Triangles up to which all are kept, however fine: they fit in the cache, and a thin object stays exact."""
 FEWEST_TRIANGLES = 2_000
 """The same in maps that are trusted: fewer take no more room than patches."""
-CELL_MARGIN = wp.constant(1.0e-3)
-"""Cells by which cells are widened when records are put into them, for the rounding of rays."""
 PATCH_RISE = 1.0 / 3.0
 """Of a patch's side, by which the box is widened for patches that rise out of it where the surface bends. Without it
 one ray in ten thousand slipped under them to the far wall."""
@@ -75,8 +74,6 @@ LARGEST_LEAP = wp.constant(250)
 """Cells: what fits in a byte, and more than a grid has."""
 EMPTY = wp.constant(1.0e30)
 """Sides of a box with nothing in it: its low is above its high."""
-SUBCELLS = wp.constant(64)
-"""Parts of a cell, 4 x 4 x 4, in whose order its records stand, so that the 8 of a block lie together."""
 
 
 @wp.struct
@@ -129,26 +126,6 @@ def piece_of(target: GridTarget, item: int) -> Piece:
 
 
 @wp.func
-def low_corner(piece: Piece) -> wp.vec3:
-    """Of the box about a piece."""
-    b, c = piece.corner + piece.edge_u, piece.corner + piece.edge_v
-    low = wp.min(piece.corner, wp.min(b, c))
-    if piece.kind > TRIANGLE:
-        low = wp.min(low, b + piece.edge_v)
-    return low
-
-
-@wp.func
-def high_corner(piece: Piece) -> wp.vec3:
-    """Of the box about a piece."""
-    b, c = piece.corner + piece.edge_u, piece.corner + piece.edge_v
-    high = wp.max(piece.corner, wp.max(b, c))
-    if piece.kind > TRIANGLE:
-        high = wp.max(high, b + piece.edge_v)
-    return high
-
-
-@wp.func
 def cells_touched(target: GridTarget, piece: Piece) -> CellBox:
     """The cells of the box about a piece."""
     low, high = low_corner(piece), high_corner(piece)
@@ -158,46 +135,6 @@ def cells_touched(target: GridTarget, piece: Piece) -> CellBox:
     box.first = wp.vec3i(cell_number(low[0] - m, nx), cell_number(low[1] - m, ny), cell_number(low[2] - m, nz))
     box.last = wp.vec3i(cell_number(high[0] + m, nx), cell_number(high[1] + m, ny), cell_number(high[2] + m, nz))
     return box
-
-
-@wp.func
-def is_apart(axis: wp.vec3, piece: Piece, half: float) -> bool:
-    """Whether an axis separates a piece from the cube about 0."""
-    p = wp.dot(axis, piece.corner)
-    u, v = wp.dot(axis, piece.edge_u), wp.dot(axis, piece.edge_v)
-    low = p + wp.min(0.0, wp.min(u, v))
-    high = p + wp.max(0.0, wp.max(u, v))
-    if piece.kind > TRIANGLE:
-        low = wp.min(low, p + u + v)
-        high = wp.max(high, p + u + v)
-    reach = half * (wp.abs(axis[0]) + wp.abs(axis[1]) + wp.abs(axis[2]))
-    return low > reach or high < -reach
-
-
-@wp.func
-def edges_are_apart(edge: wp.vec3, piece: Piece, half: float) -> bool:
-    """Whether a cross product of this edge with a side of the cube separates them."""
-    return (
-        is_apart(wp.vec3(0.0, -edge[2], edge[1]), piece, half)
-        or is_apart(wp.vec3(edge[2], 0.0, -edge[0]), piece, half)
-        or is_apart(wp.vec3(-edge[1], edge[0], 0.0), piece, half)
-    )
-
-
-@wp.func
-def touches_cell(piece: Piece, x: int, y: int, z: int) -> bool:
-    """Separating-axis test of a piece against a cell whose box it is known to meet (Akenine-Moeller 2001)."""
-    half = 0.5 + CELL_MARGIN
-    local = Piece()
-    local.corner = piece.corner - wp.vec3(float(x) + 0.5, float(y) + 0.5, float(z) + 0.5)
-    local.edge_u = piece.edge_u
-    local.edge_v = piece.edge_v
-    local.kind = piece.kind
-    if is_apart(wp.cross(piece.edge_u, piece.edge_v), local, half):
-        return False
-    if edges_are_apart(piece.edge_u, local, half) or edges_are_apart(piece.edge_v, local, half):
-        return False
-    return piece.kind > TRIANGLE or not edges_are_apart(piece.edge_v - piece.edge_u, local, half)
 
 
 @wp.func
@@ -213,16 +150,6 @@ def fits_mask(box: CellBox) -> bool:
     """Whether a box has no more cells than a mask has bits."""
     n = box.last - box.first + wp.vec3i(1)
     return wp.int64(n[0]) * wp.int64(n[1]) * wp.int64(n[2]) <= wp.int64(MASK_BITS)
-
-
-@wp.func
-def subcell(piece: Piece, x: int, y: int, z: int) -> int:
-    """The part of a cell that holds the middle of what lies of a piece in it, in Morton order."""
-    corner = wp.vec3(float(x), float(y), float(z))
-    low, high = wp.max(low_corner(piece), corner), wp.min(high_corner(piece), corner + wp.vec3(1.0))
-    middle = 0.5 * (low + high) - corner
-    u, v, w = cell_number(4.0 * middle[0], 4), cell_number(4.0 * middle[1], 4), cell_number(4.0 * middle[2], 4)
-    return 32 * (w / 2) + 16 * (v / 2) + 8 * (u / 2) + 4 * (w % 2) + 2 * (v % 2) + u % 2
 
 
 @launch.kernel

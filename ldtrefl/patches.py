@@ -20,6 +20,7 @@ from ldtrefl.device_scene import DeviceMesh
 from ldtrefl.grid import LARGE, cell_number, number_of_cell
 from ldtrefl.launch import kernel
 from ldtrefl.peel import snapped_vertices
+from ldtrefl.pieces import Piece
 from ldtrefl.raster import (
     TEXEL_OF_SUBTEXEL,
     FixedTriangle,
@@ -42,17 +43,6 @@ TOO_LARGE = wp.constant(2 << 16)
 """Fixed-point texels across from which a triangle of a dense mesh is kept as it is."""
 KEPT = wp.constant(-1)
 """Stands for the cell of a triangle that is kept as it is."""
-
-
-@wp.struct
-class Piece:
-    """A record's shape: corner, and the two edges from it; a triangle, or a parallelogram."""
-
-    corner: wp.vec3  # cell space, a patch's that of the survey
-    edge_u: wp.vec3
-    edge_v: wp.vec3
-    kind: int  # of ``grid.py``
-    triangle: int
 
 
 @wp.struct

@@ -31,6 +31,7 @@ BOTTOM_TO_TOP = (
     "binning",
     "peel",
     "grid",
+    "pieces",
     "patches",
     "doubts",
     "grid_build",
