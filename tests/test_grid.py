@@ -108,12 +108,11 @@ def test_patches_show_their_front(wound: str) -> None:
     faces = {"outwards": mesh.faces, "inwards": mesh.faces[:, ::-1], "open": mesh.faces[:-1]}[wound]
     maps = ldtrefl.peel(mesh.vertices, faces)
     assert maps.grid.view.front == {"outwards": 1, "inwards": -1, "open": 0}[wound]
-    # Of the open one 1.03 in a thousand hits show a back, counted over three million rays; these give 1.03 +- 0.07.
-    origins, directions = rays_from_outside(500_000, 7)
+    origins, directions = rays_from_outside(100_000, 7)
     hits = maps.trace(origins, directions)
     out = (hits.normal * directions).sum(axis=1) * (-1 if wound == "inwards" else 1)
     back = (out > 0).sum() / (hits.triangle >= 0).sum()
-    assert back <= (1.2e-3 if wound == "open" else 1e-4), back
+    assert back <= (1e-3 if wound == "open" else 1e-4), back
 
 
 def test_patches_do_not_lose_what_is_thin_or_large() -> None:
