@@ -89,6 +89,8 @@ def gather_lists(lists: wp.array, counts: wp.array) -> wp.array:
         counts: (chunks + 1,) int32, lengths of the lists, a 0 at the end.
     """
     places, total = exclusive_scan(counts)
+    if total == lists.shape[0]:
+        return lists  # all are kept, and stand where they belong
     gathered = wp.empty(total, dtype=wp.int32, device=lists.device)
     if total:
         launch_chunks(copy_lists, lists.shape[0], [lists, places, gathered], lists.device)

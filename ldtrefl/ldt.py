@@ -25,7 +25,7 @@ from ldtrefl.march import TRACERS
 from ldtrefl.march_exact import GRAZING
 from ldtrefl.mesh import Mesh
 from ldtrefl.peel import Maps, Rasteriser, sort_fragments, sorted_maps
-from ldtrefl.trace import Hits, trace_batch, trace_rays
+from ldtrefl.trace import Hits, array_of_views, trace_batch, trace_rays
 
 FORMAT = 1
 """Of saved files; goes up when what they hold changes."""
@@ -216,7 +216,7 @@ class LayeredDepthTexture:
         """
         view = self.view(search, linear_steps=linear_steps, binary_steps=binary_steps)
         tracer = TRACERS[search]
-        views = wp.array([view], dtype=tracer.view, device=self.geometry.vertices.device)
+        views = array_of_views([view], tracer.view, self.geometry.vertices.device)
         return trace_batch(tracer, views, self.geometry, origins, directions)
 
     def save(self, path: str | Path) -> None:
@@ -275,7 +275,7 @@ def _shows_backs(grid: Grid) -> bool:
     """Whether rays from all around meet backs of a surface that is closed as a whole: a part is wound the other way."""
     device = grid.view.vertices.device
     origins, directions = _rays_all_around(str(device))
-    views = wp.array([grid.view], dtype=TRACERS["exact"].view, device=device)
+    views = array_of_views([grid.view], TRACERS["exact"].view, device)
     hits = trace_rays(TRACERS["exact"], views, (np.zeros(3), 1.0), origins, directions)
     towards = (hits.normal.numpy() * directions.numpy()).sum(axis=1)
     return int((grid.view.front * towards > GRAZING).sum()) > FEW_BACKS

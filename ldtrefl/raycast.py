@@ -12,7 +12,7 @@ import warp as wp
 from ldtrefl import launch
 from ldtrefl.device_scene import DeviceMesh
 from ldtrefl.mesh import Mesh
-from ldtrefl.trace import Hit, Hits, Tracer, no_hit, trace_batch
+from ldtrefl.trace import Hit, Hits, Tracer, array_of_views, no_hit, trace_batch
 
 
 @wp.struct
@@ -91,5 +91,5 @@ class Raycaster:
         Raises:
             InputError: the arrays' shapes are not (n, 3) and equal.
         """
-        views = wp.array([self.view()], dtype=BvhView, device=self.geometry.vertices.device)
+        views = array_of_views([self.view()], BvhView, self.geometry.vertices.device)
         return trace_batch(BVH, views, self.geometry, origins, directions)

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-import warp as wp
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
@@ -22,6 +21,7 @@ from ldtrefl.launch import Stats
 from ldtrefl.methods.base import CONFIG, CommonConfig, Method, Reflection
 from ldtrefl.raycast import BVH, BvhView, Raycaster
 from ldtrefl.reflect import BoundTracer, follow_rays
+from ldtrefl.trace import array_of_views
 
 
 class Bvh(Method):
@@ -44,7 +44,7 @@ class Bvh(Method):
                     if id(entry.geometry) not in self._trees:
                         self._trees[id(entry.geometry)] = Raycaster.of(entry.geometry)
                 views = [self._trees[id(entry.geometry)].view() for entry in self.scene.objects]
-                self._bound = BoundTracer(BVH, wp.array(views, dtype=BvhView, device=self.scene.device))
+                self._bound = BoundTracer(BVH, array_of_views(views, BvhView, self.scene.device))
         return self._bound
 
     def shadow_tracer(self, stats: Stats) -> BoundTracer:

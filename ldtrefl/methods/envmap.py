@@ -27,6 +27,7 @@ from ldtrefl.raycast import BVH, BvhView, Raycaster
 from ldtrefl.rays import RayBuffer
 from ldtrefl.reflect import BoundTracer, no_shadows, shade_gbuffer
 from ldtrefl.scene import Camera
+from ldtrefl.trace import array_of_views
 
 
 @wp.func
@@ -108,7 +109,7 @@ class EnvironmentMap(Method):
             with stats.stage("build", self.scene.device):
                 self._trees = [Raycaster.of(entry.geometry) for entry in self.scene.objects]
                 views = [tree.view() for tree in self._trees]
-                self._shadows = BoundTracer(BVH, wp.array(views, dtype=BvhView, device=self.scene.device))
+                self._shadows = BoundTracer(BVH, array_of_views(views, BvhView, self.scene.device))
         return self._shadows
 
     def reflect(self, gbuffer: GBuffer, rays: Any, stats: Stats) -> Reflection:

@@ -13,7 +13,7 @@ import warp as wp
 import ldtrefl
 from ldtrefl import launch, shapes, skips
 from ldtrefl.scene import Camera, Light, Material, Object, Scene
-from ldtrefl.trace import Tracer, batch_kernel
+from ldtrefl.trace import Tracer, array_of_views, batch_kernel
 
 KNOTS = {
     "knot 1 k": (64, 8),
@@ -75,7 +75,7 @@ class Batch:
         outputs = [self.t, wp.empty(n, dtype=wp.vec3, device=device), self.triangle]
         outputs += [wp.empty(n, dtype=wp.vec2, device=device), wp.zeros(n, dtype=wp.uint8, device=device)]
         self._view = view  # owns the arrays that the kernel's copy points to
-        views = wp.array([view], dtype=tracer.view, device=device)
+        views = array_of_views([view], tracer.view, device)
         self._arguments = [views, wp.vec3d(0.0, 0.0, 0.0), wp.float64(1.0), origins, directions, *outputs]
         self._kernel, self._count, self._device = batch_kernel(tracer), n, device
 
