@@ -16,7 +16,7 @@ def add_number(first: int, numbers: wp.array(dtype=int)):
     numbers[i] += i + 1
 
 
-def check_launches(count: int, times: int) -> None:
+def assert_all_launched(count: int, times: int) -> None:
     device = launch.resolve_device(None)
     numbers = wp.zeros(count + 1, dtype=int, device=device)
     for _ in range(times):
@@ -28,7 +28,7 @@ def check_launches(count: int, times: int) -> None:
 @pytest.mark.parametrize("count", [1, 2, 63, 129, 1000, 100_003])
 def test_every_item_once(threads: int, count: int) -> None:
     ldtrefl.set_threads(threads)
-    check_launches(count, 20)
+    assert_all_launched(count, 20)
 
 
 def test_launches_from_several_threads() -> None:
@@ -37,7 +37,7 @@ def test_launches_from_several_threads() -> None:
 
     def check() -> None:
         try:
-            check_launches(10_000, 200)
+            assert_all_launched(10_000, 200)
         except BaseException as error:
             failures.append(error)
 
@@ -52,5 +52,5 @@ def test_launches_from_several_threads() -> None:
 def test_progress_reaches_the_end() -> None:
     seen: list[float] = []
     with launch.progress_to(lambda stage, fraction: seen.append(fraction)):
-        check_launches(1000, 1)
+        assert_all_launched(1000, 1)
     assert len(seen) > 1 and seen == sorted(seen) and seen[-1] == 1.0
