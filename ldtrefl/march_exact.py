@@ -16,7 +16,7 @@ from ldtrefl.shade import barycentrics_at, brought_inside
 from ldtrefl.trace import Hit, Tracer, no_hit
 
 CELL_SLACK = 1.0e-4
-"""Cells by which cells overlap along the ray: ten roundings of a coordinate in a grid of 128."""
+"""Cells by which cells overlap along the ray: some twenty roundings of a coordinate in a grid of 64."""
 
 EDGE_SLACK = 1.0e-5
 """Barycentric units by which records are widened, so that no ray slips between two triangles that share an edge."""
