@@ -11,6 +11,7 @@ from ldtrefl.methods import all_methods
 PACKAGE = Path(ldtrefl.__file__).parent
 BOTTOM_TO_TOP = (
     "errors",
+    "budget",
     "files",
     "native",
     "skips",
