@@ -129,9 +129,9 @@ def barycentrics_at(a: wp.vec3, b: wp.vec3, c: wp.vec3, p: wp.vec3) -> wp.vec2:
 def extended_coordinates(record: ObjectRecord, triangle: int, point: wp.vec3) -> wp.vec2:
     """Barycentrics of a point about a triangle that stands for its neighbours, too: outside it they go on linearly.
 
-    So shading is smooth over a patch of many triangles, though only one of them is known. They go on until the normal
-    has turned by ``FARTHEST_TURN``: the normals of a noisy mesh say nothing of their neighbours'. ``point`` is in
-    device space.
+    So shading is smooth over a patch of many triangles, though only one of them is known. Where normals are
+    interpolated they go on until the normal has turned by ``FARTHEST_TURN``: the normals of a noisy mesh say nothing of
+    their neighbours'. ``point`` is in device space.
     """
     corners = record.faces[triangle]
     a, b, c = record.vertices[corners[0]], record.vertices[corners[1]], record.vertices[corners[2]]
@@ -140,6 +140,8 @@ def extended_coordinates(record: ObjectRecord, triangle: int, point: wp.vec3) ->
     if not at[2] > SMALLEST_SINE:
         return middle
     offset = wp.vec2(at[0], at[1]) - middle
+    if record.smooth == 0:
+        return middle + offset  # there may be no normals, and none is interpolated
     na = record.normals[corners[0]]
     turn = wp.length(offset[0] * (record.normals[corners[1]] - na) + offset[1] * (record.normals[corners[2]] - na))
     return middle + wp.min(1.0, FARTHEST_TURN * wp.length(na) / wp.max(turn, SMALLEST_NORMAL)) * offset
@@ -197,7 +199,7 @@ def surface_at(objects: wp.array(dtype=ObjectRecord), index: int, triangle: int,
     surface.emission = objects[index].emission
     surface.mirror = objects[index].mirror
     if objects[index].fresnel != 0:
-        surface.mirror = schlick(surface.mirror, -wp.dot(normal, view))
+        surface.mirror = schlick(surface.mirror, -wp.dot(surface.normal, view))
     return surface
 
 
