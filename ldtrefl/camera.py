@@ -18,7 +18,7 @@ from ldtrefl.scene import Camera
 class CameraView:
     """A camera in device space."""
 
-    eye: wp.vec3
+    eye: wp.vec3d
     right: wp.vec3  # at distance 1, half the image's width long
     down: wp.vec3  # at distance 1, half the image's height long
     forward: wp.vec3  # unit
@@ -32,18 +32,6 @@ def camera_ray(camera: CameraView, x: float, y: float) -> wp.vec3:
     across = 2.0 * x / float(camera.width) - 1.0
     along = 2.0 * y / float(camera.height) - 1.0
     return camera.forward + across * camera.right + along * camera.down
-
-
-@wp.func
-def project_point(camera: CameraView, point: wp.vec3) -> wp.vec3:
-    """(x, y) in pixels and the depth along the view axis; x and y mean nothing where the depth is not positive."""
-    offset = point - camera.eye
-    depth = wp.dot(offset, camera.forward)
-    across = wp.dot(offset, camera.right) / wp.dot(camera.right, camera.right)
-    along = wp.dot(offset, camera.down) / wp.dot(camera.down, camera.down)
-    return wp.vec3(
-        0.5 * float(camera.width) * (across / depth + 1.0), 0.5 * float(camera.height) * (along / depth + 1.0), depth
-    )
 
 
 @functools.lru_cache(maxsize=1)
@@ -61,7 +49,7 @@ def camera_view(camera: Camera, device_from_world: np.ndarray) -> CameraView:
     right, down, forward = camera_axes(camera)
     half_height = np.tan(np.radians(camera.fov_y) / 2.0)
     view = CameraView()
-    view.eye = wp.vec3(*(device_from_world @ [*camera.eye, 1.0])[:3])
+    view.eye = wp.vec3d(*(device_from_world @ [*camera.eye, 1.0])[:3])
     view.right = wp.vec3(*(right * half_height * camera.width / camera.height))
     view.down = wp.vec3(*(down * half_height))
     view.forward = wp.vec3(*forward)

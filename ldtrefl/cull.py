@@ -25,6 +25,7 @@ from ldtrefl import launch
 from ldtrefl.device_scene import DeviceScene, ObjectRecord
 from ldtrefl.gbuffer import GBuffer
 from ldtrefl.rays import RUN, RayBuffer, Regions, meets_sphere, objects_in, regions_of_runs, run_count, word_count
+from ldtrefl.vectors import as_double, as_single
 
 CullTest = Literal["safe", "flat"]
 
@@ -115,7 +116,7 @@ def bounds_of_run(rays: RayBuffer, begin: int, end: int) -> RunBounds:
     alive = int(0)
     for i in range(begin, end):
         if rays.source[i] >= 0:
-            middle += rays.origin[i]
+            middle += as_single(rays.origin[i])
             axis += rays.direction[i]
             alive += 1
     bounds = RunBounds()
@@ -124,7 +125,7 @@ def bounds_of_run(rays: RayBuffer, begin: int, end: int) -> RunBounds:
     bounds.cosine = 1.0
     for i in range(begin, end):
         if rays.source[i] >= 0:
-            bounds.reach = wp.max(bounds.reach, wp.length(rays.origin[i] - bounds.middle))
+            bounds.reach = wp.max(bounds.reach, wp.length(as_single(rays.origin[i]) - bounds.middle))
             bounds.cosine = wp.min(bounds.cosine, wp.dot(rays.direction[i], bounds.axis))
     bounds.cosine = wp.max(bounds.cosine - COSINE_SLACK, -1.0)
     return bounds
@@ -174,7 +175,7 @@ def cull_runs(
                     if (
                         rays.source[i] >= 0
                         and rays.source[i] != k
-                        and meets_sphere(rays.origin[i], rays.direction[i], centre, radius)
+                        and meets_sphere(as_single(rays.origin[i]), rays.direction[i], centre, radius)
                     ):
                         bits = bits | (wp.uint32(1) << wp.uint32(k % 32))
                         i = end
@@ -193,18 +194,18 @@ def cull_triangles(
     objects: wp.array(dtype=ObjectRecord),
     reflector: int,
     first_row: int,
-    eye: wp.vec3,
+    eye: wp.vec3d,
     # Out: bit k % 32 of word k / 32 is set if the triangle can show object k
     bits_out: wp.array2d(dtype=wp.uint32),
 ):
     triangle = first + wp.tid()
     corners = objects[reflector].faces[triangle]
     device_from_unit = objects[reflector].device_from_unit
-    a = wp.transform_point(device_from_unit, objects[reflector].vertices[corners[0]])
-    b = wp.transform_point(device_from_unit, objects[reflector].vertices[corners[1]])
-    c = wp.transform_point(device_from_unit, objects[reflector].vertices[corners[2]])
+    a = as_single(wp.transform_point(device_from_unit, as_double(objects[reflector].vertices[corners[0]])))
+    b = as_single(wp.transform_point(device_from_unit, as_double(objects[reflector].vertices[corners[1]])))
+    c = as_single(wp.transform_point(device_from_unit, as_double(objects[reflector].vertices[corners[2]])))
     for k in range(objects.shape[0]):
-        if k != reflector and shows_flat(eye, a, b, c, objects[k].centre, objects[k].radius):
+        if k != reflector and shows_flat(as_single(eye), a, b, c, objects[k].centre, objects[k].radius):
             word = bits_out[first_row + triangle, k / 32]
             bits_out[first_row + triangle, k / 32] = word | (wp.uint32(1) << wp.uint32(k % 32))
 

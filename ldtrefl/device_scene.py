@@ -1,9 +1,10 @@
 """The scene as kernels see it: geometry, places and materials in device arrays.
 
 Three spaces. *World*: the scene file's. *Device*: the world moved and scaled alike along all axes so that the objects
-fill the unit box about 0; all rays and positions in kernels are in it, so float32 holds at any scale and offset.
-*Unit*: an object's own vertices with their bounding box's longest side from -1 to 1. The matrices between them are
-composed in float64. Objects with the same mesh share its arrays: a moved object moves its rays, never its maps.
+fill the unit box about 0; all rays and positions in kernels are in it. Positions in it are float64, distances and
+directions float32: what is near a surface is as precise as the surface's own object, however large the rest of the
+scene is. *Unit*: an object's own vertices with their bounding box's longest side from -1 to 1, where float32 holds at
+any scale and offset. Objects with the same mesh share its arrays: a moved object moves its rays, never its maps.
 """
 
 from __future__ import annotations
@@ -18,6 +19,9 @@ import warp as wp
 from ldtrefl.mesh import Mesh
 from ldtrefl.scene import Camera, Light, Object, Scene
 
+SPHERE_PADDING = 2.0e-6
+"""Device units by which bounding spheres are widened: ten roundings of a float32 anywhere in the device's box."""
+
 
 @wp.struct
 class ObjectRecord:
@@ -27,8 +31,9 @@ class ObjectRecord:
     normals: wp.array(dtype=wp.vec3)  # unit space, not always of unit length, zero where undefined
     uvs: wp.array(dtype=wp.vec2)  # empty without texture coordinates
     faces: wp.array(dtype=wp.vec3i)
-    device_from_unit: wp.mat44
-    unit_from_device: wp.mat44
+    device_from_unit: wp.mat44d
+    unit_from_device: wp.mat44d
+    unit_from_direction: wp.mat33  # the linear part of unit_from_device
     normal_from_unit: wp.mat33  # inverse transpose of device_from_unit's linear part
     centre: wp.vec3  # bounding sphere, device space
     radius: float
@@ -51,7 +56,8 @@ class LightRecord:
     """A light in device space."""
 
     is_point: int
-    vector: wp.vec3  # directional: unit, towards the light; point: its position
+    towards: wp.vec3  # of a directional one, unit
+    position: wp.vec3d  # of a point light
     radiance: wp.vec3  # point: intensity in device units
 
 
@@ -186,8 +192,9 @@ class DeviceScene:
         inverse = np.linalg.inv(device_from_unit)
         record = ObjectRecord()
         record.vertices, record.faces = geometry.vertices, geometry.faces
-        record.device_from_unit = wp.mat44(device_from_unit.astype(np.float32))
-        record.unit_from_device = wp.mat44(inverse.astype(np.float32))
+        record.device_from_unit = wp.mat44d(device_from_unit)
+        record.unit_from_device = wp.mat44d(inverse)
+        record.unit_from_direction = wp.mat33(inverse[:3, :3].astype(np.float32))
         normal_from_unit = inverse[:3, :3].T / np.abs(inverse[:3, :3]).max()
         record.normal_from_unit = wp.mat33(normal_from_unit.astype(np.float32))
         record.centre, record.radius = _bounding_sphere(geometry.mesh, device_from_unit)
@@ -250,11 +257,11 @@ class DeviceScene:
         record = LightRecord()
         record.is_point = int(light.kind == "point")
         if light.position is not None and light.intensity is not None:
-            record.vector = wp.vec3(*(self.device_from_world @ [*light.position, 1.0])[:3])
+            record.position = wp.vec3d(*(self.device_from_world @ [*light.position, 1.0])[:3])
             record.radiance = wp.vec3(*(np.asarray(light.intensity) * self.device_units_per_world_unit**2))
         elif light.direction is not None and light.radiance is not None:
             towards = -np.asarray(light.direction, float)
-            record.vector = wp.vec3(*(towards / np.linalg.norm(towards)))
+            record.towards = wp.vec3(*(towards / np.linalg.norm(towards)))
             record.radiance = wp.vec3(*light.radiance)
         return record
 
@@ -280,10 +287,10 @@ def _world_corners(entry: Object) -> np.ndarray:
 
 
 def _bounding_sphere(mesh: Mesh, device_from_unit: np.ndarray) -> tuple[wp.vec3, float]:
-    """About the box's centre, padded for the rounding of float32 positions."""
+    """About the box's centre, padded for the rounding of what rays are tested with: float32 in the device's box."""
     centre = device_from_unit[:3, 3]
     # Not by a matrix product: the threads of BLAS go on spinning for a frame's length and take the cores of ours.
     points = np.einsum("ij,kj->ik", mesh.unit_vertices.astype(float), device_from_unit[:3, :3])
     used = points[mesh.is_used]
     radius = float(np.sqrt((used**2).sum(axis=1).max()))
-    return wp.vec3(*centre), radius * (1.0 + 1e-5) + 1e-6 * float(np.abs(centre).max())
+    return wp.vec3(*centre), radius * (1.0 + 1e-5) + SPHERE_PADDING

@@ -28,6 +28,7 @@ from ldtrefl.raster import (
 )
 from ldtrefl.scene import Camera
 from ldtrefl.shade import Surface, surface_at
+from ldtrefl.vectors import as_double, from_to
 
 LARGE_BOX = wp.constant(4096)
 """Pixels in a triangle's box from which it is drawn in bands of rows, so that all threads share it."""
@@ -395,7 +396,7 @@ def find_surfaces(
     gbuffer: GBufferView,
     objects: wp.array(dtype=ObjectRecord),
     # Out:
-    position_out: wp.array(dtype=wp.vec3),
+    position_out: wp.array(dtype=wp.vec3d),
     normal_out: wp.array(dtype=wp.vec3),
 ):
     i = first + wp.tid()
@@ -416,7 +417,8 @@ def pixel_view(gbuffer: GBufferView, objects: wp.array(dtype=ObjectRecord), pixe
         + u * objects[index].vertices[corners[1]]
         + v * objects[index].vertices[corners[2]]
     )
-    return wp.normalize(wp.transform_point(objects[index].device_from_unit, point) - gbuffer.camera.eye)
+    position = wp.transform_point(objects[index].device_from_unit, as_double(point))
+    return wp.normalize(from_to(gbuffer.camera.eye, position))
 
 
 @wp.func
@@ -457,9 +459,9 @@ class GBuffer:
 
     @functools.cached_property
     def surfaces(self) -> tuple[wp.array, wp.array]:
-        """Positions and shading normals of all pixels in device space, (h * w,) vec3 each."""
+        """Positions, (h * w,) vec3d, and shading normals, (h * w,) vec3, of all pixels in device space."""
         device = self.scene.device
-        position = wp.zeros(self.pixel_count, dtype=wp.vec3, device=device)
+        position = wp.zeros(self.pixel_count, dtype=wp.vec3d, device=device)
         normal = wp.zeros(self.pixel_count, dtype=wp.vec3, device=device)
         launch.launch(find_surfaces, self.pixel_count, [self.view, self.scene.records, position, normal], device)
         return position, normal

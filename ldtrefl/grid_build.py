@@ -30,6 +30,7 @@ from ldtrefl.grid import (
 )
 from ldtrefl.patches import PATCH_MARGIN, Survey
 from ldtrefl.pieces import CELL_MARGIN, SUBCELLS, Piece, high_corner, low_corner, subcell, touches_cell
+from ldtrefl.vectors import as_double, as_single
 
 Quality = Literal["fast", "balanced", "exact"]
 
@@ -301,18 +302,6 @@ def find_leaps(
                                 smallest = wp.min(smallest, int(leaps_out[base + i + dx + dy + dz]))
                     leap = smallest + 1
                 leaps_out[base + i] = wp.uint8(leap)
-
-
-@wp.func
-def as_double(p: wp.vec3) -> wp.vec3d:
-    """The same vector in float64."""
-    return wp.vec3d(wp.float64(p[0]), wp.float64(p[1]), wp.float64(p[2]))
-
-
-@wp.func
-def as_single(p: wp.vec3d) -> wp.vec3:
-    """The nearest vector in float32."""
-    return wp.vec3(float(p[0]), float(p[1]), float(p[2]))
 
 
 @wp.func

@@ -34,6 +34,13 @@ EDGE_ON = 2.0e-7
 """|n . direction| up to which a record is seen edge on, to float32's rounding, and is not met: nothing is known of
 where."""
 
+OWN_PATCHES = wp.constant(2.0)
+"""Sides of a patch from its start within which a ray may pass through patches of its own surface: a bent surface has
+left the plane of a patch by then."""
+
+OWN_STEP = wp.constant(1.0 / 16.0)
+"""Sides of a patch by which a search goes on behind such a patch."""
+
 
 @wp.struct
 class GridHit:
@@ -122,11 +129,31 @@ def closest_hit_exact(
 
 
 @wp.func
+def is_own_surface(hit: Hit, direction: wp.vec3, outwards: wp.vec3) -> bool:
+    """Whether a ray that has just left a surface passes through what it meets to the same side as it left."""
+    return wp.dot(hit.normal, direction) * wp.dot(hit.normal, outwards) > 0.0
+
+
+@wp.func
 def occluded_exact(
-    views: wp.array(dtype=GridView), index: int, origin: wp.vec3, direction: wp.vec3, t_max: float
+    views: wp.array(dtype=GridView), index: int, origin: wp.vec3, direction: wp.vec3, t_max: float, outwards: wp.vec3
 ) -> bool:
-    """The tracer's ``occluded`` by :func:`march_exact`."""
-    return closest_hit_exact(views, index, origin, direction, t_max).triangle >= 0
+    """The tracer's ``occluded`` by :func:`march_exact`.
+
+    A ray may start under the patches that stand for its own surface. It then passes through them from within, close to
+    its start: those are not met.
+    """
+    side = 2.0 * views[index].half_patch / views[index].cells_per_unit
+    own = wp.where(outwards == wp.vec3(0.0), 0.0, OWN_PATCHES * side)
+    passed = float(0.0)
+    while passed <= own:
+        hit = closest_hit_exact(views, index, origin + passed * direction, direction, t_max - passed)
+        if hit.triangle < 0:
+            return False
+        if passed + hit.t >= own or not is_own_surface(hit, direction, outwards):
+            return True
+        passed += hit.t + OWN_STEP * side
+    return closest_hit_exact(views, index, origin + passed * direction, direction, t_max - passed).triangle >= 0
 
 
-EXACT = Tracer("exact", GridView, closest_hit_exact, occluded_exact, clearance=1e-4)
+EXACT = Tracer("exact", GridView, closest_hit_exact, occluded_exact)

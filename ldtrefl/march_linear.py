@@ -34,6 +34,9 @@ meshes, 2 gives more wrong hits in hollows and no fewer misses."""
 DEEP = wp.constant(2.0)
 """Texels from every fragment beyond which the origin is inside the object for sure, not by a texel's error."""
 
+CLEARANCE = wp.constant(2.5)
+"""Texels above its surface at which a ray starts that leaves it: texels are blocks, and a start within one is inside."""
+
 
 @wp.struct
 class Crossing:
@@ -194,10 +197,11 @@ def closest_hit_linear(
 
 @wp.func
 def occluded_linear(
-    views: wp.array(dtype=LdtView), index: int, origin: wp.vec3, direction: wp.vec3, t_max: float
+    views: wp.array(dtype=LdtView), index: int, origin: wp.vec3, direction: wp.vec3, t_max: float, outwards: wp.vec3
 ) -> bool:
     """The tracer's ``occluded`` by :func:`march_linear`."""
-    return closest_hit_linear(views, index, origin, direction, t_max).triangle >= 0
+    start = origin + (CLEARANCE / views[index].texels_per_unit) * outwards
+    return closest_hit_linear(views, index, start, direction, t_max).triangle >= 0
 
 
-LINEAR = Tracer("linear", LdtView, closest_hit_linear, occluded_linear, clearance=0.02)
+LINEAR = Tracer("linear", LdtView, closest_hit_linear, occluded_linear)

@@ -40,12 +40,14 @@ def closest_hit_bvh(
 
 
 @wp.func
-def occluded_bvh(views: wp.array(dtype=BvhView), index: int, origin: wp.vec3, direction: wp.vec3, t_max: float) -> bool:
-    """The tracer's ``occluded``."""
+def occluded_bvh(
+    views: wp.array(dtype=BvhView), index: int, origin: wp.vec3, direction: wp.vec3, t_max: float, outwards: wp.vec3
+) -> bool:
+    """The tracer's ``occluded``; a ray that leaves the mesh starts above its own triangle."""
     return wp.mesh_query_ray_anyhit(views[index].mesh, origin, direction, t_max)
 
 
-BVH = Tracer("bvh", BvhView, closest_hit_bvh, occluded_bvh, clearance=1e-5)
+BVH = Tracer("bvh", BvhView, closest_hit_bvh, occluded_bvh)
 
 
 class Raycaster:

@@ -22,7 +22,7 @@ class RayBuffer:
     """Rays on their way; a ray is dead where its source is -1."""
 
     pixel: wp.array(dtype=wp.int32)
-    origin: wp.array(dtype=wp.vec3)
+    origin: wp.array(dtype=wp.vec3d)
     direction: wp.array(dtype=wp.vec3)
     weight: wp.array(dtype=wp.vec3)  # what a unit of radiance met now adds to the pixel
     source: wp.array(dtype=wp.int32)  # the object that it left

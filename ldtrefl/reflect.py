@@ -33,7 +33,9 @@ from ldtrefl.shade import (
     surface_at,
 )
 from ldtrefl.skips import Skips
-from ldtrefl.trace import Hit, Tracer, no_hit
+from ldtrefl.trace import Hit, Tracer, closest_hit_of, no_hit, occluded_of
+from ldtrefl.unit_rays import into_unit, leaving_point, unit_normal
+from ldtrefl.vectors import as_single, point_along
 
 BLOCK = 8
 """Pixels along a side of the blocks in which the first rays stand."""
@@ -65,13 +67,13 @@ def never_hit(views: wp.array(dtype=NoView), index: int, origin: wp.vec3, direct
 
 @wp.func
 def never_occluded(
-    views: wp.array(dtype=NoView), index: int, origin: wp.vec3, direction: wp.vec3, t_max: float
+    views: wp.array(dtype=NoView), index: int, origin: wp.vec3, direction: wp.vec3, t_max: float, outwards: wp.vec3
 ) -> bool:
     """``occluded`` of a tracer that sees nothing."""
     return False
 
 
-NOTHING = Tracer("nothing", NoView, never_hit, never_occluded, clearance=0.0)
+NOTHING = Tracer("nothing", NoView, never_hit, never_occluded)
 """The tracer of scenes without shadows: kernels built from it hold no shadow rays."""
 
 
@@ -138,7 +140,7 @@ def next_in_turn(
 def closest_hits_kernel(tracer: Tracer, bounds: bool = True) -> wp.Kernel:
     """The kernel that finds where rays end. With ``bounds`` an object is searched for only if the ray enters its
     bounding sphere before it has met another; of 32 the first to be entered comes first."""
-    closest_hit = tracer.closest_hit
+    closest = closest_hit_of(tracer)
     next_object = next_entered if bounds else next_in_turn
     to_infinity = wp.constant(not bounds)
 
@@ -155,6 +157,7 @@ def closest_hits_kernel(tracer: Tracer, bounds: bool = True) -> wp.Kernel:
     ):
         i = first + wp.tid()
         source, origin, direction = rays.source[i], rays.origin[i], rays.direction[i]
+        rounded_origin = as_single(origin)
         nearest = Nearest()
         nearest.t = float(wp.inf)
         nearest.object = -1
@@ -166,17 +169,15 @@ def closest_hits_kernel(tracer: Tracer, bounds: bool = True) -> wp.Kernel:
             left = object_bits(regions, objects, i, word)
             if source / 32 == word:
                 left = without(left, source)
-            k = next_object(objects, left, word, origin, direction, nearest.t)
+            k = next_object(objects, left, word, rounded_origin, direction, nearest.t)
             while k >= 0:
                 # t stays in device units: divide by the direction's length in unit space.
-                way = wp.transform_vector(objects[k].unit_from_device, direction)
-                stretch = wp.length(way)
-                start = wp.transform_point(objects[k].unit_from_device, origin)
-                t_max = wp.where(to_infinity, wp.inf, BEYOND * nearest.t * stretch)
-                hit = closest_hit(views, k, start, way / stretch, t_max)
+                ray = into_unit(objects[k], origin, direction)
+                t_max = wp.where(to_infinity, wp.inf, BEYOND * nearest.t * ray.stretch)
+                hit = closest(views, k, ray.start, ray.way, ray.way, t_max)
                 steps += hit.steps
                 searches += 1
-                t = hit.t / stretch
+                t = hit.t / ray.stretch
                 # Of two in one place the first counts, in whatever order they are met.
                 if hit.triangle >= 0 and (t < nearest.t or (t == nearest.t and k < nearest.object)):
                     nearest.t = t
@@ -184,7 +185,7 @@ def closest_hits_kernel(tracer: Tracer, bounds: bool = True) -> wp.Kernel:
                     nearest.triangle = hit.triangle
                     nearest.barycentrics = wp.vec2(hit.u, hit.v)
                 left = without(left, k)
-                k = next_object(objects, left, word, origin, direction, nearest.t)
+                k = next_object(objects, left, word, rounded_origin, direction, nearest.t)
         hits.t[i] = nearest.t
         hits.object[i] = nearest.object
         hits.triangle[i] = nearest.triangle
@@ -198,8 +199,7 @@ def closest_hits_kernel(tracer: Tracer, bounds: bool = True) -> wp.Kernel:
 @functools.cache
 def direct_radiance_of(tracer: Tracer) -> Any:
     """``direct_radiance`` with this tracer's shadows."""
-    occluded = tracer.occluded
-    clearance = wp.constant(tracer.clearance)
+    is_blocked = occluded_of(tracer)
     view_type = tracer.view
 
     @wp.func
@@ -210,14 +210,17 @@ def direct_radiance_of(tracer: Tracer) -> Any:
         towards: wp.vec3,
         distance: float,
     ) -> bool:
-        origin = surface.position + clearance * surface.facet
+        own = surface.object
+        origin = leaving_point(objects[own], surface.triangle, surface.position, surface.facet)
+        rounded_origin = as_single(origin)
         for k in range(objects.shape[0]):
-            entry = sphere_entry(origin, towards, objects[k].centre, objects[k].radius)
+            entry = sphere_entry(rounded_origin, towards, objects[k].centre, objects[k].radius)
             if entry >= 0.0 and entry < distance:
-                way = wp.transform_vector(objects[k].unit_from_device, towards)
-                stretch = wp.length(way)
-                start = wp.transform_point(objects[k].unit_from_device, origin)
-                if occluded(views, k, start, way / stretch, distance * stretch):
+                ray = into_unit(objects[k], origin, towards)
+                outwards = wp.vec3(0.0)
+                if k == own:
+                    outwards = unit_normal(objects[k], surface.facet)
+                if is_blocked(views, k, ray.start, ray.way, distance * ray.stretch, outwards):
                     return False
         return True
 
@@ -324,7 +327,7 @@ def shade_hits_kernel(tracer: Tracer) -> wp.Kernel:
             radiance[pixel] = radiance[pixel] + wp.cw_mul(weight, environment_radiance(lighting, direction))
         else:
             uv = hits.barycentrics[i]
-            point = rays.origin[i] + hits.t[i] * direction
+            point = point_along(rays.origin[i], direction, hits.t[i])
             if uv[0] < 0.0:
                 uv = extended_coordinates(objects[index], hits.triangle[i], point)
             surface = surface_at(objects, index, hits.triangle[i], uv[0], uv[1], direction)
@@ -526,7 +529,8 @@ def shade_gbuffer(gbuffer: GBuffer, shadow: BoundTracer) -> Shaded:
     n = len(pixels)
     rays = RayBuffer()
     rays.pixel = wp.array(pixels, dtype=wp.int32, device=device)
-    rays.origin, rays.direction, rays.weight, mirror = (wp.empty(n, dtype=wp.vec3, device=device) for _ in range(4))
+    rays.origin = wp.empty(n, dtype=wp.vec3d, device=device)
+    rays.direction, rays.weight, mirror = (wp.empty(n, dtype=wp.vec3, device=device) for _ in range(3))
     rays.source = wp.empty(n, dtype=wp.int32, device=device)
     launch.launch(shade_reflectors_kernel(shadow.tracer), n, [*inputs, rays, radiance, mirror], device)
     return Shaded(radiance, rays, mirror)

@@ -11,9 +11,13 @@ from typing import Any
 import warp as wp
 
 from ldtrefl.device_scene import LightingRecord, ObjectRecord
+from ldtrefl.vectors import as_double, as_single, from_to
 
 SMALLEST_NORMAL = wp.constant(1.0e-12)
 """Squared length below which a vertex normal says nothing and the facet's is taken."""
+
+SMALLEST_SQUARE = wp.constant(1.0e-36)
+"""Squared distance of a light that float32 can divide by: a light in the surface itself divides by no 0."""
 
 SMALLEST_SINE = wp.constant(1.0e-6)
 """Squared sine of a triangle's corner below which nothing is extended beyond it."""
@@ -29,7 +33,9 @@ ONE_THIRD = wp.constant(1.0 / 3.0)
 class Surface:
     """A point of a surface, ready to be shaded."""
 
-    position: wp.vec3
+    position: wp.vec3d
+    object: int
+    triangle: int
     normal: wp.vec3  # shading normal, unit, on the viewer's side of the facet
     facet: wp.vec3  # facet normal, unit, facing the viewer
     albedo: wp.vec3  # times the texture
@@ -126,7 +132,7 @@ def barycentrics_at(a: wp.vec3, b: wp.vec3, c: wp.vec3, p: wp.vec3) -> wp.vec2:
 
 
 @wp.func
-def extended_coordinates(record: ObjectRecord, triangle: int, point: wp.vec3) -> wp.vec2:
+def extended_coordinates(record: ObjectRecord, triangle: int, point: wp.vec3d) -> wp.vec2:
     """Barycentrics of a point about a triangle that stands for its neighbours, too: outside it they go on linearly.
 
     So shading is smooth over a patch of many triangles, though only one of them is known. Where normals are
@@ -136,7 +142,7 @@ def extended_coordinates(record: ObjectRecord, triangle: int, point: wp.vec3) ->
     corners = record.faces[triangle]
     a, b, c = record.vertices[corners[0]], record.vertices[corners[1]], record.vertices[corners[2]]
     middle = wp.vec2(ONE_THIRD, ONE_THIRD)
-    at = plane_coordinates(a, b, c, wp.transform_point(record.unit_from_device, point))
+    at = plane_coordinates(a, b, c, as_single(wp.transform_point(record.unit_from_device, point)))
     if not at[2] > SMALLEST_SINE:
         return middle
     offset = wp.vec2(at[0], at[1]) - middle
@@ -158,7 +164,9 @@ def surface_at(objects: wp.array(dtype=ObjectRecord), index: int, triangle: int,
         objects[index].vertices[corners[2]],
     )
     surface = Surface()
-    surface.position = wp.transform_point(objects[index].device_from_unit, w * a + u * b + v * c)
+    surface.object = index
+    surface.triangle = triangle
+    surface.position = wp.transform_point(objects[index].device_from_unit, as_double(w * a + u * b + v * c))
 
     # Turn the facet towards the viewer, and the interpolated normal to the facet's side: for that no length matters.
     across = wp.cross(b - a, c - a)
@@ -216,15 +224,14 @@ def make_direct_radiance(is_lit: Any) -> Any:
     ) -> wp.vec3:
         total = lighting.ambient
         for i in range(lighting.lights.shape[0]):
-            towards = lighting.lights[i].vector
+            towards = lighting.lights[i].towards
             radiance = lighting.lights[i].radiance
             distance = float(wp.inf)
             if lighting.lights[i].is_point != 0:
-                offset = towards - surface.position
+                offset = from_to(surface.position, lighting.lights[i].position)
                 distance = wp.length(offset)
                 towards = wp.normalize(offset)
-                # A light on the surface itself would divide by zero.
-                radiance = radiance / wp.max(distance * distance, SMALLEST_NORMAL)
+                radiance = radiance / wp.max(distance * distance, SMALLEST_SQUARE)
             cosine = wp.dot(surface.normal, towards)
             if cosine > 0.0:
                 if is_lit(views, objects, surface, towards, distance):

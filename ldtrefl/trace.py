@@ -20,13 +20,11 @@ from ldtrefl import launch
 from ldtrefl.device_scene import DeviceMesh
 from ldtrefl.errors import InputError
 from ldtrefl.shade import ONE_THIRD
+from ldtrefl.unit_rays import distance_skipped, skipped_to
 
 SHORTEST = wp.constant(1.0e-15)
 LONGEST = wp.constant(1.0e15)
 """Lengths of directions whose squares stay well inside float32's range."""
-
-NEAR = wp.constant(8.0)
-"""Distance from the middle of the unit cube beyond which a ray's way to it is taken in float64."""
 
 
 @wp.struct
@@ -61,15 +59,15 @@ class Tracer:
     """A pair of Warp functions and the type of the views that they read.
 
     ``closest_hit(views, index, origin, direction, t_max) -> Hit`` and ``occluded(views, index, origin, direction,
-    t_max) -> bool``: object ``index``, its unit space, unit direction, hits at ``0 <= t < t_max``.
+    t_max, outwards) -> bool``: object ``index``, its unit space, unit direction, hits at ``0 <= t < t_max``. Origins
+    are near the object, see ``unit_rays.py``. ``outwards`` is 0 but for a ray that leaves the object's own surface: it
+    is the unit normal there, on the ray's side, and what the tracer takes for that surface is not met.
     """
 
     name: str
     view: Any
     closest_hit: Any
     occluded: Any
-    clearance: float
-    """How far from a surface, in unit space, a ray must start so as not to meet that surface again."""
 
 
 @dataclass(frozen=True)
@@ -99,9 +97,45 @@ def array_of_views(views: Sequence[Any], view: Any, device: wp.Device) -> wp.arr
 
 
 @functools.cache
+def closest_hit_of(tracer: Tracer) -> Any:
+    """``closest(views, index, start, direction, way, t_max) -> Hit`` for rays from anywhere: ``start`` in the unit space
+    of object ``index``, float64; ``way`` is the unit vector of ``direction``; t and ``t_max`` in unit space."""
+    closest_hit = tracer.closest_hit
+
+    @wp.func
+    def closest(views: Any, index: int, start: wp.vec3d, direction: wp.vec3, way: wp.vec3, t_max: float) -> Hit:
+        skipped = distance_skipped(start, direction)
+        hit = no_hit()
+        if skipped < wp.float64(t_max):
+            near = skipped_to(start, direction, skipped)
+            hit = closest_hit(views, index, near, way, float(wp.float64(t_max) - skipped))
+            hit.t = float(wp.float64(hit.t) + skipped)
+        return hit
+
+    return closest
+
+
+@functools.cache
+def occluded_of(tracer: Tracer) -> Any:
+    """``is_blocked(views, index, start, way, t_max, outwards) -> bool`` for rays from anywhere, see
+    :func:`closest_hit_of`."""
+    occluded = tracer.occluded
+
+    @wp.func
+    def is_blocked(views: Any, index: int, start: wp.vec3d, way: wp.vec3, t_max: float, outwards: wp.vec3) -> bool:
+        skipped = distance_skipped(start, way)
+        if skipped >= wp.float64(t_max):
+            return False
+        near = skipped_to(start, way, skipped)
+        return occluded(views, index, near, way, float(wp.float64(t_max) - skipped), outwards)
+
+    return is_blocked
+
+
+@functools.cache
 def batch_kernel(tracer: Tracer) -> wp.Kernel:
     """The kernel that traces rays given in object space."""
-    closest_hit = tracer.closest_hit
+    closest = closest_hit_of(tracer)
 
     @launch.kernel
     def trace_batch(
@@ -135,20 +169,9 @@ def batch_kernel(tracer: Tracer) -> wp.Kernel:
             start = per_half * wp.vec3d(
                 wp.float64(origin[0]) - centre[0], wp.float64(origin[1]) - centre[1], wp.float64(origin[2]) - centre[2]
             )
-            near = wp.vec3(float(start[0]), float(start[1]), float(start[2]))
-            way = direction / length
-            skipped = wp.float64(0.0)
-            if wp.abs(near[0]) > NEAR or wp.abs(near[1]) > NEAR or wp.abs(near[2]) > NEAR:
-                # So may the object be from the ray's start: come near in float64, too.
-                exact_way = wp.normalize(
-                    wp.vec3d(wp.float64(direction[0]), wp.float64(direction[1]), wp.float64(direction[2]))
-                )
-                skipped = wp.max(-wp.dot(start, exact_way) - wp.float64(NEAR), skipped)
-                start = start + skipped * exact_way
-                near = wp.vec3(float(start[0]), float(start[1]), float(start[2]))
-            hit = closest_hit(views, 0, near, way, float(wp.inf))
+            hit = closest(views, 0, start, direction, direction / length, float(wp.inf))
             if hit.triangle >= 0:
-                hit.t = float((wp.float64(hit.t) + skipped) / (per_half * wp.float64(length)))
+                hit.t = float(wp.float64(hit.t) / (per_half * wp.float64(length)))
                 normal = hit.normal
                 if hit.u < 0.0:
                     hit.u = ONE_THIRD

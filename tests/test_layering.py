@@ -25,6 +25,8 @@ BOTTOM_TO_TOP = (
     "scene",
     "camera",
     "device_scene",
+    "vectors",
+    "unit_rays",
     "shade",
     "cubemap",
     "raster",

@@ -1,0 +1,85 @@
+"""Rays in an object's unit space: how they get there, start near the object, and leave its surface.
+
+One way for every tracer. Origins are float64 until the ray has come near: a small object far from where the ray starts,
+or in a scene that is a million times larger, is met as precisely as alone.
+"""
+
+from __future__ import annotations
+
+import warp as wp
+
+from ldtrefl.device_scene import ObjectRecord
+from ldtrefl.vectors import as_double, as_single
+
+NEAR = wp.constant(wp.float64(8.0))
+"""Unit space: distance from the middle beyond which a ray's way to the object is taken in float64."""
+
+LEAVING = wp.constant(wp.float64(1.0e-6))
+"""How far above its own triangle a ray leaves, relative to the coordinates there: 16 roundings of a float32. A point of
+a triangle is off by three, and what tests it again by as many (Waechter and Binder 2019, "A Fast and Robust Method for
+Avoiding Self-Intersection")."""
+
+
+@wp.struct
+class UnitRay:
+    """A ray in an object's unit space."""
+
+    start: wp.vec3d
+    way: wp.vec3  # unit
+    stretch: float  # length in unit space of a device unit along the ray
+
+
+@wp.func
+def into_unit(record: ObjectRecord, origin: wp.vec3d, direction: wp.vec3) -> UnitRay:
+    """A ray of device space in the unit space of an object."""
+    ray = UnitRay()
+    way = record.unit_from_direction * direction
+    ray.stretch = wp.length(way)
+    ray.way = way / ray.stretch
+    ray.start = wp.transform_point(record.unit_from_device, origin)
+    return ray
+
+
+@wp.func
+def distance_skipped(start: wp.vec3d, direction: wp.vec3) -> wp.float64:
+    """How far a ray that starts far away may go in float64 before anything can be met; 0 for one that starts near.
+
+    ``direction`` is as exact as it was given, of any length; the distance is in unit space.
+    """
+    if wp.abs(start[0]) <= NEAR and wp.abs(start[1]) <= NEAR and wp.abs(start[2]) <= NEAR:
+        return wp.float64(0.0)
+    return wp.max(-wp.dot(start, wp.normalize(as_double(direction))) - NEAR, wp.float64(0.0))
+
+
+@wp.func
+def skipped_to(start: wp.vec3d, direction: wp.vec3, skipped: wp.float64) -> wp.vec3:
+    """Where a ray is after so much of its way."""
+    if skipped == wp.float64(0.0):
+        return as_single(start)
+    return as_single(start + skipped * wp.normalize(as_double(direction)))
+
+
+@wp.func
+def leaving_point(record: ObjectRecord, triangle: int, point: wp.vec3d, outwards: wp.vec3) -> wp.vec3d:
+    """Where a ray starts that leaves an object's surface at a point of a triangle's plane, to the side of ``outwards``.
+
+    The point is put on the plane first: what met the ray may have left it a little off. All in device space.
+    """
+    corners = record.faces[triangle]
+    a, b, c = record.vertices[corners[0]], record.vertices[corners[1]], record.vertices[corners[2]]
+    across = wp.cross(b - a, c - a)
+    if across == wp.vec3(0.0):
+        return point
+    normal = wp.normalize(as_double(across))
+    if wp.dot(record.normal_from_unit * wp.normalize(across), outwards) < 0.0:
+        normal = -normal
+    start = wp.transform_point(record.unit_from_device, point)
+    largest = wp.max(wp.max(wp.max(wp.abs(a)), wp.max(wp.abs(b))), wp.max(wp.abs(c)))
+    height = LEAVING * wp.float64(largest) - wp.dot(normal, start - as_double(a))
+    return wp.transform_point(record.device_from_unit, start + height * normal)
+
+
+@wp.func
+def unit_normal(record: ObjectRecord, normal: wp.vec3) -> wp.vec3:
+    """A normal of device space in the unit space of an object, unit."""
+    return wp.normalize(as_single(wp.transform_vector(wp.transpose(record.device_from_unit), as_double(normal))))

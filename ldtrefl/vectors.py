@@ -1,0 +1,29 @@
+"""Vectors of float32 and float64 in kernels: positions are float64 where they must be, directions float32."""
+
+from __future__ import annotations
+
+import warp as wp
+
+
+@wp.func
+def as_double(p: wp.vec3) -> wp.vec3d:
+    """The same vector in float64."""
+    return wp.vec3d(wp.float64(p[0]), wp.float64(p[1]), wp.float64(p[2]))
+
+
+@wp.func
+def as_single(p: wp.vec3d) -> wp.vec3:
+    """The nearest vector in float32."""
+    return wp.vec3(float(p[0]), float(p[1]), float(p[2]))
+
+
+@wp.func
+def from_to(a: wp.vec3d, b: wp.vec3d) -> wp.vec3:
+    """The vector from one point to another: subtracted in float64, so that neighbours keep their distance."""
+    return wp.vec3(float(b[0] - a[0]), float(b[1] - a[1]), float(b[2] - a[2]))
+
+
+@wp.func
+def point_along(origin: wp.vec3d, direction: wp.vec3, t: float) -> wp.vec3d:
+    """``origin + t * direction`` in float64."""
+    return origin + wp.float64(t) * as_double(direction)
