@@ -98,8 +98,11 @@ def array_of_views(views: Sequence[Any], view: Any, device: wp.Device) -> wp.arr
 
 @functools.cache
 def closest_hit_of(tracer: Tracer) -> Any:
-    """``closest(views, index, start, direction, way, t_max) -> Hit`` for rays from anywhere: ``start`` in the unit space
-    of object ``index``, float64; ``way`` is the unit vector of ``direction``; t and ``t_max`` in unit space."""
+    """``closest(views, index, start, direction, way, t_max) -> Hit`` for rays from anywhere.
+
+    ``start`` is in the unit space of object ``index``, float64; ``way`` is the unit vector of ``direction``; t and
+    ``t_max`` are in unit space.
+    """
     closest_hit = tracer.closest_hit
 
     @wp.func
