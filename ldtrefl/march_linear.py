@@ -35,7 +35,7 @@ DEEP = wp.constant(2.0)
 """Texels from every fragment beyond which the origin is inside the object for sure, not by a texel's error."""
 
 CLEARANCE = wp.constant(2.5)
-"""Texels above its surface at which a ray starts that leaves it: a start within a texel, which is a block, is inside."""
+"""Texels above its surface at which a ray starts that leaves it: a texel is a block, and in it a ray is inside."""
 
 
 @wp.struct
