@@ -72,6 +72,15 @@ class TexelFrame:
 
 def texel_frame(mesh: Mesh, resolution: int) -> TexelFrame:
     """The box of texels about a mesh."""
+    return _about(mesh, mesh.bounds, resolution)
+
+
+def bulk_frame(mesh: Mesh, resolution: int) -> TexelFrame:
+    """The box of texels about a mesh without its strays."""
+    return _about(mesh, mesh.bulk, resolution)
+
+
+def _about(mesh: Mesh, box: np.ndarray, resolution: int) -> TexelFrame:
     centre, half = mesh.unit_frame
-    low, high = ((bound - centre) / half for bound in mesh.bounds)
+    low, high = ((bound - centre) / half for bound in box)
     return TexelFrame.around(low, high, resolution)

@@ -18,6 +18,7 @@ import warp as wp
 
 from ldtrefl.mesh import Mesh
 from ldtrefl.scene import Camera, Light, Object, Scene
+from ldtrefl.strays import stray_array
 
 SPHERE_PADDING = 2.0e-6
 """Device units by which bounding spheres are widened: ten roundings of a float32 anywhere in the device's box."""
@@ -81,6 +82,18 @@ class DeviceMesh:
         self.mesh = mesh
         self.vertices = wp.array(mesh.unit_vertices, dtype=wp.vec3, device=device)
         self.faces = wp.array(mesh.faces, dtype=wp.vec3i, device=device)
+
+    @functools.cached_property
+    def strays(self) -> wp.array:
+        """(k,) ``StrayTriangle``."""
+        return stray_array(self.mesh, self.vertices.device)
+
+    @functools.cached_property
+    def exact_vertices(self) -> wp.array:
+        """(n,) vec3d in unit space if the mesh has strays, else empty: float32 then holds for all of it."""
+        centre, half = self.mesh.unit_frame
+        exact = (self.mesh.vertices - centre) / half if len(self.mesh.strays) else np.zeros((0, 3))
+        return wp.array(exact, dtype=wp.vec3d, device=self.vertices.device)
 
     @functools.cached_property
     def normals(self) -> wp.array:

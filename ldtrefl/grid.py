@@ -24,6 +24,9 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from ldtrefl.device_scene import DeviceMesh
+from ldtrefl.strays import StrayTriangle
+
 LANES = wp.constant(8)
 """Records in a block, and blocks in a node: the width of AVX2. 16 measured the same, 4 slower on dense meshes."""
 TRIANGLE_ROWS = wp.constant(13)
@@ -59,6 +62,7 @@ class GridView:
     cell_offset: wp.vec3
     vertices: wp.array(dtype=wp.vec3)  # unit space
     faces: wp.array(dtype=wp.vec3i)
+    strays: wp.array(dtype=StrayTriangle)  # what lies far outside, and in no cell
 
 
 @wp.func
@@ -103,19 +107,17 @@ class Grid:
         return arrays, {**values, **plain, "records": int(self.records), "patches": bool(self.patches)}
 
     @classmethod
-    def unpacked(
-        cls, arrays: dict[str, np.ndarray], values: dict[str, Any], vertices: wp.array, faces: wp.array
-    ) -> Grid:
+    def unpacked(cls, arrays: dict[str, np.ndarray], values: dict[str, Any], geometry: DeviceMesh) -> Grid:
         """The grid of a mesh on a device from what :meth:`packed` gave; on the CPU it shares the arrays' memory."""
         view = GridView()
         for name, dtype in _DTYPES.items():
-            setattr(view, name, wp.array(arrays[name], dtype=dtype, device=vertices.device, copy=False))
+            setattr(view, name, wp.array(arrays[name], dtype=dtype, device=geometry.vertices.device, copy=False))
         for name in ("low", "high", "cell_offset"):
             setattr(view, name, wp.vec3(*values[name]))
         view.cells = wp.vec3i(*values["cells"])
         for name in ("front", "half_patch", "horizon", "cells_per_unit"):
             setattr(view, name, values[name])
-        view.vertices, view.faces = vertices, faces
+        view.vertices, view.faces, view.strays = geometry.vertices, geometry.faces, geometry.strays
         return cls(view, values["records"], values["patches"])
 
     @functools.cached_property

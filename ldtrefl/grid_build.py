@@ -13,7 +13,7 @@ import warp as wp
 
 from ldtrefl import launch
 from ldtrefl.binning import bin_items, exclusive_scan
-from ldtrefl.cubemap import TexelFrame, texel_frame
+from ldtrefl.cubemap import TexelFrame, bulk_frame, texel_frame
 from ldtrefl.device_scene import DeviceMesh
 from ldtrefl.doubts import Doubts, doubts_of, no_doubts
 from ldtrefl.grid import (
@@ -405,18 +405,25 @@ def build_grid(geometry: DeviceMesh, resolution: int, quality: Quality, *, trust
     the maps' texels, and smooth on that scale: patches then stand for them. In ``trusted`` maps, whose texels are
     smaller than what can be seen, they do so for rough surfaces and for smaller meshes, too.
     """
-    triangles = len(geometry.faces)
-    if quality != "exact" and triangles > (FEWEST_TRIANGLES if trusted else FEW_TRIANGLES):
-        frame = texel_frame(geometry.mesh, max(1, round(resolution / PATCH_TEXELS[quality])))
+    mesh, triangles = geometry.mesh, len(geometry.faces)
+    if quality != "exact" and len(mesh.strays) == 0 and triangles > (FEWEST_TRIANGLES if trusted else FEW_TRIANGLES):
+        frame = texel_frame(mesh, max(1, round(resolution / PATCH_TEXELS[quality])))
         survey = Survey(geometry, frame, max(1, min(SURVEY_CELLS, round(SURVEY_CELLS_PER_PATCH * max(frame.size)))))
         if survey.small > DENSE * survey.count * PATCH_TEXELS[quality] ** 2:
             doubts = no_doubts(survey) if trusted else doubts_of(survey, LARGEST_TURN[quality])
             if doubts.share < DOUBTFUL:
                 return _of_patches(geometry, survey, doubts)
-    target, _ = _target(geometry, texel_frame(geometry.mesh, resolution), triangles)
-    every = wp.empty(0, dtype=wp.int32, device=geometry.vertices.device)
-    view, records = _built(target, geometry, every, triangles)
+    bulk = triangles - len(mesh.strays)
+    target, _ = _target(geometry, bulk_frame(mesh, resolution), bulk)
+    view, records = _built(target, geometry, _listed_bulk(geometry), bulk)
     return Grid(view, records, False)
+
+
+def _listed_bulk(geometry: DeviceMesh) -> wp.array:
+    """The triangles that are no strays; an empty list if there are none."""
+    strays = geometry.mesh.strays
+    bulk = np.delete(np.arange(len(geometry.faces), dtype=np.int32), strays) if len(strays) else np.zeros(0, np.int32)
+    return wp.array(bulk, dtype=wp.int32, device=geometry.vertices.device)
 
 
 def _of_patches(geometry: DeviceMesh, survey: Survey, doubts: Doubts) -> Grid:
@@ -488,8 +495,9 @@ def _built(target: Any, geometry: DeviceMesh, items: wp.array, count: int) -> tu
     launch.launch(find_leaps, 8, [view.node, target.cells, view.leaps], device)
 
     centre, half = geometry.mesh.unit_frame
-    low, high = ((bound - centre) / half * target.cells_per_unit + target.cell_offset for bound in geometry.mesh.bounds)
+    low, high = ((bound - centre) / half * target.cells_per_unit + target.cell_offset for bound in geometry.mesh.bulk)
     view.low, view.high = wp.vec3(*low), wp.vec3(*high)
     view.cells, view.vertices, view.faces = target.cells, geometry.vertices, geometry.faces
+    view.strays = geometry.strays
     view.cells_per_unit, view.cell_offset = target.cells_per_unit, target.cell_offset
     return view, records

@@ -86,8 +86,8 @@ class LayeredDepthTexture:
     @functools.cached_property
     def grid(self) -> Grid:
         """The occupancy grid that the exact search walks."""
-        mesh = self.geometry.vertices, self.geometry.faces
-        return self._kept("grid", self._make_grid, lambda entry: Grid.unpacked(entry.arrays, entry.values, *mesh))
+        geometry = self.geometry
+        return self._kept("grid", self._make_grid, lambda entry: Grid.unpacked(entry.arrays, entry.values, geometry))
 
     def _make_grid(self) -> Grid:
         made = build_grid(self.geometry, self.resolution, self.quality, trusted=self.trusted)

@@ -13,6 +13,7 @@ import warp as wp
 
 from ldtrefl.grid import LANES, LARGE, PATCH_ROWS, SIDES, TRIANGLE, TRIANGLE_ROWS, GridView
 from ldtrefl.shade import barycentrics_at, brought_inside
+from ldtrefl.strays import StrayHit, first_stray
 from ldtrefl.trace import Hit, Tracer, no_hit
 
 CELL_SLACK = 1.0e-4
@@ -156,4 +157,12 @@ def occluded_exact(
     return closest_hit_exact(views, index, origin + passed * direction, direction, t_max - passed).triangle >= 0
 
 
-EXACT = Tracer("exact", GridView, closest_hit_exact, occluded_exact)
+@wp.func
+def stray_hit_exact(
+    views: wp.array(dtype=GridView), index: int, origin: wp.vec3d, direction: wp.vec3, t_max: float
+) -> StrayHit:
+    """The tracer's ``stray_hit``."""
+    return first_stray(views[index].strays, origin, direction, t_max)
+
+
+EXACT = Tracer("exact", GridView, closest_hit_exact, occluded_exact, stray_hit_exact)

@@ -21,6 +21,7 @@ import warp as wp
 from ldtrefl.cubemap import texel_from_point
 from ldtrefl.fragments import LdtView, texel_number, triangle_of
 from ldtrefl.shade import barycentrics_at
+from ldtrefl.strays import StrayHit, no_stray
 from ldtrefl.trace import Hit, Tracer, no_hit
 
 BOX_MARGIN = wp.constant(0.01)
@@ -204,4 +205,12 @@ def occluded_linear(
     return closest_hit_linear(views, index, start, direction, t_max).triangle >= 0
 
 
-LINEAR = Tracer("linear", LdtView, closest_hit_linear, occluded_linear)
+@wp.func
+def no_stray_linear(
+    views: wp.array(dtype=LdtView), index: int, origin: wp.vec3d, direction: wp.vec3, t_max: float
+) -> StrayHit:
+    """The tracer's ``stray_hit``: the maps hold all triangles."""
+    return no_stray()
+
+
+LINEAR = Tracer("linear", LdtView, closest_hit_linear, occluded_linear, no_stray_linear)

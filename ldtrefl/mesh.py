@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import trimesh
 
+from ldtrefl.bulk import stray_triangles
 from ldtrefl.errors import InputError
 from ldtrefl.image import linear_from_srgb
 
@@ -98,9 +99,22 @@ class Mesh:
         return np.stack([used.min(axis=0), used.max(axis=0)])
 
     @functools.cached_property
+    def strays(self) -> np.ndarray:
+        """(k,) int32: the few triangles far outside the bulk, most often none."""
+        return stray_triangles(self.vertices, self.faces, self.bounds)
+
+    @functools.cached_property
+    def bulk(self) -> np.ndarray:
+        """(2, 3) float64: the lowest and highest corner of the box about all triangles but the strays."""
+        if len(self.strays) == 0:
+            return self.bounds
+        corners = self.vertices[np.delete(self.faces, self.strays, axis=0)].reshape(-1, 3)
+        return np.stack([corners.min(axis=0), corners.max(axis=0)])
+
+    @functools.cached_property
     def unit_frame(self) -> tuple[np.ndarray, float]:
-        """``(centre, half)``: ``(v - centre) / half`` fills -1..1 along the box's longest side."""
-        low, high = self.bounds
+        """``(centre, half)``: ``(v - centre) / half`` fills -1..1 along the longest side of the bulk's box."""
+        low, high = self.bulk
         half = float((high - low).max()) / 2.0
         return low + (high - low) / 2.0, half if half > 0.0 else 1.0
 

@@ -7,11 +7,13 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import warp as wp
 
 from ldtrefl import launch
 from ldtrefl.device_scene import DeviceMesh
 from ldtrefl.mesh import Mesh
+from ldtrefl.strays import StrayHit, StrayTriangle, first_stray
 from ldtrefl.trace import Hit, Hits, Tracer, array_of_views, no_hit, trace_batch
 
 
@@ -19,7 +21,8 @@ from ldtrefl.trace import Hit, Hits, Tracer, array_of_views, no_hit, trace_batch
 class BvhView:
     """A mesh with its BVH."""
 
-    mesh: wp.uint64
+    mesh: wp.uint64  # without the strays
+    strays: wp.array(dtype=StrayTriangle)
 
 
 @wp.func
@@ -47,7 +50,15 @@ def occluded_bvh(
     return wp.mesh_query_ray_anyhit(views[index].mesh, origin, direction, t_max)
 
 
-BVH = Tracer("bvh", BvhView, closest_hit_bvh, occluded_bvh)
+@wp.func
+def stray_hit_bvh(
+    views: wp.array(dtype=BvhView), index: int, origin: wp.vec3d, direction: wp.vec3, t_max: float
+) -> StrayHit:
+    """The tracer's ``stray_hit``."""
+    return first_stray(views[index].strays, origin, direction, t_max)
+
+
+BVH = Tracer("bvh", BvhView, closest_hit_bvh, occluded_bvh, stray_hit_bvh)
 
 
 class Raycaster:
@@ -75,12 +86,18 @@ class Raycaster:
 
     def _build(self, geometry: DeviceMesh) -> None:
         self.geometry = geometry
-        self._mesh = wp.Mesh(geometry.vertices, geometry.faces.view(wp.int32).flatten())
+        faces = geometry.faces
+        if len(geometry.mesh.strays):
+            # A point is never met; the others keep their numbers.
+            rest = geometry.mesh.faces.copy()
+            rest[geometry.mesh.strays] = rest[np.delete(np.arange(len(rest)), geometry.mesh.strays)[0], :1]
+            faces = wp.array(rest, dtype=wp.vec3i, device=faces.device)
+        self._mesh = wp.Mesh(geometry.vertices, faces.view(wp.int32).flatten())
 
     def view(self) -> Any:
         """The ``BvhView`` for kernels."""
         view = BvhView()
-        view.mesh = self._mesh.id
+        view.mesh, view.strays = self._mesh.id, self.geometry.strays
         return view
 
     def trace(self, origins: Any, directions: Any) -> Hits:

@@ -33,6 +33,7 @@ from ldtrefl.shade import (
     surface_at,
 )
 from ldtrefl.skips import Skips
+from ldtrefl.strays import StrayHit, no_stray
 from ldtrefl.trace import Hit, Tracer, closest_hit_of, no_hit, occluded_of
 from ldtrefl.unit_rays import into_unit, leaving_point, unit_normal
 from ldtrefl.vectors import as_single, point_along
@@ -73,7 +74,15 @@ def never_occluded(
     return False
 
 
-NOTHING = Tracer("nothing", NoView, never_hit, never_occluded)
+@wp.func
+def never_stray(
+    views: wp.array(dtype=NoView), index: int, origin: wp.vec3d, direction: wp.vec3, t_max: float
+) -> StrayHit:
+    """``stray_hit`` of a tracer that sees nothing."""
+    return no_stray()
+
+
+NOTHING = Tracer("nothing", NoView, never_hit, never_occluded, never_stray)
 """The tracer of scenes without shadows: kernels built from it hold no shadow rays."""
 
 
@@ -174,7 +183,7 @@ def closest_hits_kernel(tracer: Tracer, bounds: bool = True) -> wp.Kernel:
                 # t stays in device units: divide by the direction's length in unit space.
                 ray = into_unit(objects[k], origin, direction)
                 t_max = wp.where(to_infinity, wp.inf, BEYOND * nearest.t * ray.stretch)
-                hit = closest(views, k, ray.start, ray.way, ray.way, t_max)
+                hit = closest(views, k, ray.start, ray.way, t_max)
                 steps += hit.steps
                 searches += 1
                 t = hit.t / ray.stretch

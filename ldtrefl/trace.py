@@ -20,7 +20,7 @@ from ldtrefl import launch
 from ldtrefl.device_scene import DeviceMesh
 from ldtrefl.errors import InputError
 from ldtrefl.shade import ONE_THIRD
-from ldtrefl.unit_rays import distance_skipped, skipped_to
+from ldtrefl.unit_rays import aimed_start, distance_skipped, skipped_to
 
 SHORTEST = wp.constant(1.0e-15)
 LONGEST = wp.constant(1.0e15)
@@ -62,12 +62,15 @@ class Tracer:
     t_max, outwards) -> bool``: object ``index``, its unit space, unit direction, hits at ``0 <= t < t_max``. Origins
     are near the object, see ``unit_rays.py``. ``outwards`` is 0 but for a ray that leaves the object's own surface: it
     is the unit normal there, on the ray's side, and what the tracer takes for that surface is not met.
+    ``stray_hit(views, index, origin, direction, t_max) -> StrayHit``: the same for what lies far outside the object's
+    bulk; the origin is float64 and may lie anywhere.
     """
 
     name: str
     view: Any
     closest_hit: Any
     occluded: Any
+    stray_hit: Any
 
 
 @dataclass(frozen=True)
@@ -98,21 +101,26 @@ def array_of_views(views: Sequence[Any], view: Any, device: wp.Device) -> wp.arr
 
 @functools.cache
 def closest_hit_of(tracer: Tracer) -> Any:
-    """``closest(views, index, start, direction, way, t_max) -> Hit`` for rays from anywhere.
-
-    ``start`` is in the unit space of object ``index``, float64; ``way`` is the unit vector of ``direction``; t and
-    ``t_max`` are in unit space.
-    """
-    closest_hit = tracer.closest_hit
+    """``closest(views, index, start, way, t_max) -> Hit`` for rays from anywhere: ``start`` float64, ``way`` a unit
+    vector, both in the unit space of object ``index``."""
+    closest_hit, stray_hit = tracer.closest_hit, tracer.stray_hit
 
     @wp.func
-    def closest(views: Any, index: int, start: wp.vec3d, direction: wp.vec3, way: wp.vec3, t_max: float) -> Hit:
-        skipped = distance_skipped(start, direction)
+    def closest(views: Any, index: int, start: wp.vec3d, way: wp.vec3, t_max: float) -> Hit:
+        stray = stray_hit(views, index, start, way, t_max)
+        limit = wp.float64(wp.min(stray.t, t_max))
+        skipped = distance_skipped(start, way)
         hit = no_hit()
-        if skipped < wp.float64(t_max):
-            near = skipped_to(start, direction, skipped)
-            hit = closest_hit(views, index, near, way, float(wp.float64(t_max) - skipped))
+        if skipped < limit:
+            near = skipped_to(start, way, skipped)
+            hit = closest_hit(views, index, near, way, float(limit - skipped))
             hit.t = float(wp.float64(hit.t) + skipped)
+        if hit.triangle < 0 and stray.triangle >= 0:
+            hit.t = stray.t
+            hit.triangle = stray.triangle
+            hit.u = stray.u
+            hit.v = stray.v
+            hit.normal = stray.normal
         return hit
 
     return closest
@@ -122,10 +130,12 @@ def closest_hit_of(tracer: Tracer) -> Any:
 def occluded_of(tracer: Tracer) -> Any:
     """``is_blocked(views, index, start, way, t_max, outwards) -> bool`` for rays from anywhere, see
     :func:`closest_hit_of`."""
-    occluded = tracer.occluded
+    occluded, stray_hit = tracer.occluded, tracer.stray_hit
 
     @wp.func
     def is_blocked(views: Any, index: int, start: wp.vec3d, way: wp.vec3, t_max: float, outwards: wp.vec3) -> bool:
+        if stray_hit(views, index, start, way, t_max).triangle >= 0:
+            return True
         skipped = distance_skipped(start, way)
         if skipped >= wp.float64(t_max):
             return False
@@ -172,7 +182,8 @@ def batch_kernel(tracer: Tracer) -> wp.Kernel:
             start = per_half * wp.vec3d(
                 wp.float64(origin[0]) - centre[0], wp.float64(origin[1]) - centre[1], wp.float64(origin[2]) - centre[2]
             )
-            hit = closest(views, 0, start, direction, direction / length, float(wp.inf))
+            way = direction / length
+            hit = closest(views, 0, aimed_start(start, direction, way), way, float(wp.inf))
             if hit.triangle >= 0:
                 hit.t = float(wp.float64(hit.t) / (per_half * wp.float64(length)))
                 normal = hit.normal

@@ -41,22 +41,33 @@ def into_unit(record: ObjectRecord, origin: wp.vec3d, direction: wp.vec3) -> Uni
 
 
 @wp.func
-def distance_skipped(start: wp.vec3d, direction: wp.vec3) -> wp.float64:
-    """How far a ray that starts far away may go in float64 before anything can be met; 0 for one that starts near.
-
-    ``direction`` is as exact as it was given, of any length; the distance is in unit space.
-    """
-    if wp.abs(start[0]) <= NEAR and wp.abs(start[1]) <= NEAR and wp.abs(start[2]) <= NEAR:
-        return wp.float64(0.0)
-    return wp.max(-wp.dot(start, wp.normalize(as_double(direction))) - NEAR, wp.float64(0.0))
+def is_near(start: wp.vec3d) -> bool:
+    """Whether a ray's start is near the object, where float32 does for it."""
+    return wp.abs(start[0]) <= NEAR and wp.abs(start[1]) <= NEAR and wp.abs(start[2]) <= NEAR
 
 
 @wp.func
-def skipped_to(start: wp.vec3d, direction: wp.vec3, skipped: wp.float64) -> wp.vec3:
+def distance_skipped(start: wp.vec3d, way: wp.vec3) -> wp.float64:
+    """How far a ray may go in float64 before it can meet the object's bulk; 0 for one that starts near."""
+    if is_near(start):
+        return wp.float64(0.0)
+    return wp.max(-wp.dot(start, as_double(way)) - NEAR, wp.float64(0.0))
+
+
+@wp.func
+def skipped_to(start: wp.vec3d, way: wp.vec3, skipped: wp.float64) -> wp.vec3:
     """Where a ray is after so much of its way."""
-    if skipped == wp.float64(0.0):
-        return as_single(start)
-    return as_single(start + skipped * wp.normalize(as_double(direction)))
+    return as_single(start + skipped * as_double(way))
+
+
+@wp.func
+def aimed_start(start: wp.vec3d, direction: wp.vec3, way: wp.vec3) -> wp.vec3d:
+    """A ray's start, moved aside so that along ``way``, the unit vector in float32, it comes to the object where
+    it does along ``direction`` itself. The rounding of a unit vector is as large as an object that is so far away."""
+    if is_near(start):
+        return start
+    exact = wp.normalize(as_double(direction))
+    return start + wp.max(-wp.dot(start, exact), wp.float64(0.0)) * (exact - as_double(way))
 
 
 @wp.func
