@@ -16,9 +16,13 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from ldtrefl.errors import InputError
 from ldtrefl.mesh import Mesh
 from ldtrefl.scene import Camera, Light, Object, Scene
 from ldtrefl.strays import stray_array
+
+MOST_NUMBERS = (1 << 31) - 1
+"""Triangles and vertices of all objects together: they are numbered by int32."""
 
 SPHERE_PADDING = 2.0e-6
 """Device units by which bounding spheres are widened: ten roundings of a float32 anywhere in the device's box."""
@@ -153,6 +157,9 @@ class DeviceScene:
                 self.objects.append(self._placed(index, source, meshes[id(mesh)], first_triangle, first_vertex))
             first_triangle += len(mesh.faces)
             first_vertex += len(mesh.vertices)
+            for count, what in ((first_triangle, "triangles"), (first_vertex, "vertices")):
+                if count > MOST_NUMBERS:
+                    raise InputError(f"the objects have more than {MOST_NUMBERS} {what}, instances counted in")
         self.triangle_count, self.vertex_count = first_triangle, first_vertex
         self.records = wp.array([entry.record for entry in self.objects], dtype=ObjectRecord, device=device)
         self.lighting = self._lighting(before)

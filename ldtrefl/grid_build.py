@@ -13,9 +13,11 @@ import warp as wp
 
 from ldtrefl import launch
 from ldtrefl.binning import bin_items, exclusive_scan
+from ldtrefl.budget import memory_limit
 from ldtrefl.cubemap import TexelFrame, bulk_frame, texel_frame
 from ldtrefl.device_scene import DeviceMesh
 from ldtrefl.doubts import Doubts, doubts_of, no_doubts
+from ldtrefl.errors import InputError
 from ldtrefl.grid import (
     LANES,
     LARGE,
@@ -70,6 +72,10 @@ THINNEST = wp.constant(6.0e-7)
 """Height, in unit space, below which a triangle has no area: it is ten roundings of its corners, its normal chance."""
 MASK_BITS = wp.constant(64)
 """Cells of an item's box up to which it is kept which of them it touches: that is the dearest thing to find out."""
+MOST_RECORDS = 150_000_000
+"""Records of a grid: the numbers of their floats fit in an int32."""
+BYTES_PER_RECORD = 80
+"""What a record takes, and what it is made from, at most."""
 LARGEST_LEAP = wp.constant(250)
 """Cells: what fits in a byte, and more than a grid has."""
 EMPTY = wp.constant(1.0e30)
@@ -159,7 +165,7 @@ def find_cells(
     target: GridTarget,
     items: wp.array(dtype=wp.int32),
     # Out:
-    counts_out: wp.array(dtype=wp.int32),
+    counts_out: wp.array(dtype=wp.int64),  # their sum may be larger than an int32
     masks_out: wp.array(dtype=wp.uint64),  # bit k: the item touches cell k of its box; of small boxes only
     touched_out: wp.array(dtype=wp.int32),  # 1 for cells with an item: the same value from whoever writes
 ):
@@ -180,7 +186,7 @@ def find_cells(
                     if is_masked:
                         mask = mask | bit
                 bit = bit << wp.uint64(1)
-    counts_out[i] = count
+    counts_out[i] = wp.int64(count)
     masks_out[i] = mask
 
 
@@ -191,7 +197,7 @@ def list_cells(
     target: GridTarget,
     items: wp.array(dtype=wp.int32),
     masks: wp.array(dtype=wp.uint64),
-    places: wp.array(dtype=wp.int32),
+    places: wp.array(dtype=wp.int64),
     number: wp.array(dtype=wp.int32),
     # Out:
     part_out: wp.array(dtype=wp.int32),  # the subcell, for patches and for triangles, of the occupied cell
@@ -411,12 +417,19 @@ def build_grid(geometry: DeviceMesh, resolution: int, quality: Quality, *, trust
         survey = Survey(geometry, frame, max(1, min(SURVEY_CELLS, round(SURVEY_CELLS_PER_PATCH * max(frame.size)))))
         if survey.small > DENSE * survey.count * PATCH_TEXELS[quality] ** 2:
             doubts = no_doubts(survey) if trusted else doubts_of(survey, LARGEST_TURN[quality])
-            if doubts.share < DOUBTFUL:
-                return _of_patches(geometry, survey, doubts)
+            made = _of_patches(geometry, survey, doubts) if doubts.share < DOUBTFUL else None
+            if made is not None:
+                return made
     bulk = triangles - len(mesh.strays)
-    target, _ = _target(geometry, bulk_frame(mesh, resolution), bulk)
-    view, records = _built(target, geometry, _listed_bulk(geometry), bulk)
-    return Grid(view, records, False)
+    frame, items = bulk_frame(mesh, resolution), _listed_bulk(geometry)
+    cells = _cells_for(bulk)
+    while cells >= 1:
+        target, _ = _target(geometry, frame, cells)
+        built = _built(target, geometry, items, bulk)
+        if built is not None:
+            return Grid(*built, False)
+        cells //= 2  # triangles as large as the mesh lie in thousands of cells each
+    raise InputError(f"the mesh has {triangles} triangles, too many to search (--memory allows {memory_limit()} bytes)")
 
 
 def _listed_bulk(geometry: DeviceMesh) -> wp.array:
@@ -426,13 +439,16 @@ def _listed_bulk(geometry: DeviceMesh) -> wp.array:
     return wp.array(bulk, dtype=wp.int32, device=geometry.vertices.device)
 
 
-def _of_patches(geometry: DeviceMesh, survey: Survey, doubts: Doubts) -> Grid:
-    """Patches, and the triangles that none stands for."""
+def _of_patches(geometry: DeviceMesh, survey: Survey, doubts: Doubts) -> Grid | None:
+    """Patches, and the triangles that none stands for; None if those lie in too many cells."""
     patches, touched = doubts.sure_patches()
     items = _joined(patches, survey.kept_triangles(touched, doubts.near))
-    target, cells_per_texel = _target(geometry, survey.frame, items.shape[0])
+    target, cells_per_texel = _target(geometry, survey.frame, _cells_for(items.shape[0]))
     target.patches, target.cells_per_survey_cell = doubts.patches, cells_per_texel / survey.cells_per_texel
-    view, records = _built(target, geometry, items, items.shape[0])
+    built = _built(target, geometry, items, items.shape[0])
+    if built is None:
+        return None
+    view, records = built
     view.front, view.horizon = float(survey.front), HORIZON * cells_per_texel
     view.half_patch = (0.5 + PATCH_MARGIN) * cells_per_texel
     rise = wp.vec3(PATCH_RISE * cells_per_texel)
@@ -440,9 +456,13 @@ def _of_patches(geometry: DeviceMesh, survey: Survey, doubts: Doubts) -> Grid:
     return Grid(view, records, True)
 
 
-def _target(geometry: DeviceMesh, frame: TexelFrame, items: int) -> tuple[Any, float]:
-    """The cells over a frame for so many items, and how many make a texel."""
-    cells = min(max(round(CELLS_PER_ROOT * math.sqrt(items)), FEWEST_CELLS), MOST_CELLS)
+def _cells_for(items: int) -> int:
+    """Cells along the longest side for so many items."""
+    return min(max(round(CELLS_PER_ROOT * math.sqrt(items)), FEWEST_CELLS), MOST_CELLS)
+
+
+def _target(geometry: DeviceMesh, frame: TexelFrame, cells: int) -> tuple[Any, float]:
+    """The cells over a frame, so many along its longest side, and how many make a texel."""
     ratio = cells / max(frame.size)
     target = GridTarget()
     target.vertices, target.faces = geometry.vertices, geometry.faces
@@ -461,17 +481,20 @@ def _joined(a: wp.array, b: wp.array) -> wp.array:
     return both
 
 
-def _built(target: Any, geometry: DeviceMesh, items: wp.array, count: int) -> tuple[Any, int]:
-    """The grid of ``count`` items, those listed or else all triangles, and its records."""
+def _built(target: Any, geometry: DeviceMesh, items: wp.array, count: int) -> tuple[Any, int] | None:
+    """The grid of ``count`` items, those listed or else all triangles, and its records; None if they are too many."""
     device = geometry.vertices.device
     cells = target.cells[0] * target.cells[1] * target.cells[2]
     view = GridView()
 
     # Find the pairs of cell and item.
-    counts, touched = (wp.zeros(n + 1, dtype=wp.int32, device=device) for n in (count, cells))
+    counts = wp.zeros(count + 1, dtype=wp.int64, device=device)
+    touched = wp.zeros(cells + 1, dtype=wp.int32, device=device)
     masks = wp.empty(count, dtype=wp.uint64, device=device)
     launch.launch(find_cells, count, [target, items, counts, masks, touched], device)
     places, records = exclusive_scan(counts)
+    if records > min(MOST_RECORDS, memory_limit() // BYTES_PER_RECORD):
+        return None
     number, occupied = exclusive_scan(touched)
     part, item = (wp.empty(records, dtype=wp.int32, device=device) for _ in range(2))
     launch.launch(list_cells, count, [target, items, masks, places, number, part, item], device)

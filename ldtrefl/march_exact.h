@@ -261,12 +261,13 @@ if (is_doubted(met)) {
     auto beyond = [=](Met met) OUT_OF_LINE -> Met {
         vec3 start = origin;
         int steps = met.steps;
-        while (is_doubted(met)) {
+        for (int doubts = 0; doubts < MOST_DOUBTS && is_doubted(met); ++doubts) {
             const vec3 aside = wp::normalize(wp::cross(direction, met.normal));
             const Met probe = march(start, aside, FAR);
             steps += probe.steps;
             if (facing(probe, aside) > 0.0f) break;
-            const float passed = met.t + view->horizon;
+            // By more than t's rounding, so that it does go on.
+            const float passed = met.t + greater(view->horizon, T_ROUNDING * met.t);
             start = origin + passed * direction;
             met = march(start, direction, t_max - passed);
             met.t += passed;

@@ -25,6 +25,12 @@ EDGE_SLACK = 1.0e-5
 GRAZING = 0.35
 """n . direction below which a hit on the back of a closed object's patch is doubted, see ``march_exact.h``."""
 
+MOST_DOUBTS = 64
+"""Doubted hits of a ray after which the next is taken as it is. Three in a row were never seen."""
+
+T_ROUNDING = 2.4e-7
+"""Two roundings of a float32."""
+
 NEGLIGIBLE = 1.0e-18
 """Component of a unit direction below which the ray runs along the planes: it would cross a cell in 1e18 cells."""
 
@@ -59,8 +65,8 @@ class GridHit:
 def _search_cells() -> str:
     """The C++ of ``march_exact.h`` after the constants that it names."""
     lengths = {"CELL_SLACK": CELL_SLACK, "EDGE_SLACK": EDGE_SLACK, "EDGE_ON": EDGE_ON, "NEGLIGIBLE": NEGLIGIBLE}
-    lengths |= {"GRAZING": GRAZING, "FAR": FAR}
-    numbers = {"LANES": LANES, "SIDES": SIDES, "TRIANGLE": TRIANGLE}
+    lengths |= {"GRAZING": GRAZING, "FAR": FAR, "T_ROUNDING": T_ROUNDING}
+    numbers = {"MOST_DOUBTS": MOST_DOUBTS, "LANES": LANES, "SIDES": SIDES, "TRIANGLE": TRIANGLE}
     numbers |= {"PATCH_ROWS": PATCH_ROWS, "TRIANGLE_ROWS": TRIANGLE_ROWS}
     lines = [f"constexpr float {name} = {value!r}f;" for name, value in lengths.items()]
     lines += [f"constexpr int {name} = {int(value)};" for name, value in numbers.items()]

@@ -20,6 +20,7 @@ import warp as wp
 
 from ldtrefl import launch
 from ldtrefl.binning import bin_items, exclusive_scan
+from ldtrefl.budget import take
 from ldtrefl.cubemap import TexelFrame
 from ldtrefl.device_scene import DeviceMesh
 from ldtrefl.errors import InputError
@@ -31,6 +32,9 @@ INSERTION_LIMIT = wp.constant(24)
 RUNS = 8192
 """Runs of triangles, at most, whose fragments are counted together: threads can share so many, and their sums take no
 time."""
+
+BYTES_PER_FRAGMENT = 24
+"""What a fragment takes in the maps, and while they are made."""
 
 
 @wp.struct
@@ -292,6 +296,7 @@ class Rasteriser:
         self._places, self.count = exclusive_scan(counts)
         if self.count > np.iinfo(np.int32).max:
             raise InputError(f"{self.count} fragments at resolution {max(frame.size)}; a lower resolution is needed")
+        take(BYTES_PER_FRAGMENT * self.count, f"{self.count} fragments at resolution {max(frame.size)}", "resolution")
 
     def fragments(self) -> Fragments:
         """All fragments, by triangle."""
