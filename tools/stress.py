@@ -45,7 +45,7 @@ CASES: dict[str, tuple[Size, Size]] = {  # name of the module -> full and quick 
     "invariance": (Size(20_000, 96), Size(1000, 32)),
     "motion": (Size(0, 128), Size(0, 48)),
     "fuzz": (Size(10_000_000, 0), Size(100_000, 0)),
-    "files": (Size(0, 125), Size(0, 4)),
+    "files": (Size(0, 10_000), Size(0, 80)),
     "kills": (Size(0, 64), Size(0, 16)),
 }
 

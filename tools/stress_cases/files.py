@@ -1,27 +1,53 @@
-"""Case 12: scene files and meshes with flipped bytes, cut off, of wrong types and sizes, through the command line."""
+"""Case 12: spoilt scenes, meshes, pictures and kept maps, through the command line.
+
+Each file must give status 2 and one line, or status 0 and a picture that is whole, of the size asked for and finite;
+what is kept between runs cannot matter, so a damaged file of it must give the good picture to the bit. Never a signal,
+a traceback, or a file left behind; no more memory than ``MEMORY`` and no more time than ``SECONDS``.
+"""
 
 from __future__ import annotations
 
+import contextlib
+import io
 import os
 import re
 import resource
+import shutil
 import signal
 import tempfile
-import time
+import tomllib
 import traceback
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import trimesh
+import OpenImageIO as oiio
 
 import ldtrefl
-from ldtrefl import cli, shapes
+from ldtrefl import cli
 
+from . import mutations
 from .judge import Outcome
+from .mutations import LOOP, MESHES, PICTURES
 
 NAME = "12 files"
+
 SECONDS = 10
+"""Of the processor, for a file of some kilobytes."""
+
+HANGS = 20
+"""Seconds on the clock after which a process that does nothing counts as hung."""
+
 MEMORY = 2 << 30
+"""Bytes above those of the process that it is forked from."""
+
+SHARES = {"scenes": 0.3, "meshes": 0.35, "pictures": 0.25, "kept maps": 0.1}
+
+NO_FILE = 0.02
+"""Share of the files in whose place stands a pipe, a folder, or a link to nowhere or without end."""
+
 SCENE = """
 [camera]
 eye = [0.0, -5.0, 1.0]
@@ -31,7 +57,7 @@ width = 24
 height = 16
 
 [environment]
-image = "sky.png"
+image = "SKY"
 
 [lighting]
 ambient = [0.2, 0.2, 0.2]
@@ -48,183 +74,298 @@ shape = "sphere"
 params = { segments = [16, 8] }
 [object.material]
 mirror = [0.9, 0.9, 0.9]
+fresnel = true
 
 [[object]]
-mesh = "MESH"
-fit = 1.0
+THING
 scale = [1.0, 2.0, 1.0]
 rotate = [0.0, 0.0, 1.0, 30.0]
 translate = [1.5, -1.5, 0.0]
+
+[[object]]
+shape = "plane"
+translate = [0.0, 0.0, -1.2]
+scale = 3.0
+[object.material]
+albedo = [0.5, 0.5, 0.5]
+texture = "TEXTURE"
 
 [reflection]
 method = "ldt"
 max_bounces = 2
 """
-VALUES = (
-    "1e308", "-1e308", "nan", "inf", "-inf", "0", "-1", "1e-320", "99999999999999999999", "true", '"text"', "[]", "[1]",
-    "{}", "[[1.0, 2.0, 3.0]]", "1979-05-27", '"\\u0000"', '"../../../etc/passwd"', '"/dev/zero"', '"."', '"loop.ply"',
-)  # fmt: skip
-MESHES = ("thing.ply", "ascii.ply", "thing.obj", "thing.stl", "thing.glb", "thing.off")
+KEPT = 'shape = "torus"\nparams = { segments = [150, 50] }'
+"""An object of 15,000 triangles, whose maps are kept."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A spoilt file and what it may lead to."""
+
+    scene: Path
+    row: str
+    """The row of the report that it counts in."""
+    options: tuple[str, ...] = ("--no-cache",)
+    same: np.ndarray | None = None
+    """The picture that must come of it; None if it may be refused."""
+    always: bool = False
+    """Whether a picture, any, must come of it."""
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """What a run of the command line came to."""
+
+    fault: str
+    status: int
+    seconds: float
+    memory: int
 
 
 def run(rays: int, pictures: int) -> list[Outcome]:
-    """``rays`` is not used; one mutated file for each of ``pictures`` pixels, up to 2,000."""
-    count = min(2000, 16 * pictures)
+    """``rays`` is not used; ``pictures`` spoilt files in all."""
+    outcomes: dict[str, Outcome] = {}
+    faults: Counter[str] = Counter()
+    kept_faults = Path(tempfile.gettempdir()) / "ldtrefl-stress-faults"
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        good = write_good_files(folder)
-        # All kernels are compiled and loaded here, on one thread: children start from a process that is ready.
-        ldtrefl.set_threads(1)
-        for method in ("ldt", "bvh", "envmap"):
-            assert attempt(folder / "good.toml", method, folder / "good.png") == 0
+        cases = Cases(folder)
         generator = np.random.default_rng(12)
-        outcomes = []
-        for kind, share in (("scene", 0.5), ("mesh", 0.4), ("picture", 0.1)):
-            outcome = Outcome(NAME, f"mutated {kind}s", "command line")
-            outcome.limit = f"status 0 or 2, one line, no traceback, < 2 GiB, <= {SECONDS} s, nothing written on error"
-            slowest, largest, refused = 0.0, 0, 0
-            for _ in range(int(count * share)):
-                mutated = mutate(folder, good, kind, generator)
-                fault, status, seconds, memory = watched(mutated, folder / "out.png")
-                slowest, largest, refused = max(slowest, seconds), max(largest, memory), refused + (status == 2)
+        parent = int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize()
+        seen: dict[str, list[Attempt]] = {}
+        for kind, share in SHARES.items():
+            for number in range(round(pictures * share)):
+                case = cases.make(kind, number, generator)
+                attempt = watched(case, folder / "out.exr", parent)
+                outcome = outcomes.setdefault(case.row, Outcome(NAME, case.row, "command line"))
                 outcome.tried += 1
-                outcome.seconds += seconds
-                if fault:
+                outcome.seconds += attempt.seconds
+                seen.setdefault(case.row, []).append(attempt)
+                if attempt.fault:
                     outcome.defects += 1
-                    keep = Path(tempfile.gettempdir()) / f"ldtrefl-stress-{kind}-{outcome.defects}"
-                    keep.mkdir(exist_ok=True)
-                    for path in folder.iterdir():
-                        if path.is_file():
-                            (keep / path.name).write_bytes(path.read_bytes())
-                    print(f"{kind}: {fault} (kept in {keep})")
-            outcome.what += f" ({refused} refused, slowest {slowest:.1f} s, {largest >> 20} MiB)"
-            outcome.passed = outcome.defects == 0
-            outcomes.append(outcome)
+                    same_fault = f"{kind}: {alike(attempt.fault)}"
+                    faults[same_fault] += 1
+                    if faults[same_fault] == 1:
+                        place = kept_faults / f"{len(faults)}"
+                        keep(folder, place, case, attempt)
+                        print(f"{case.row}: {attempt.fault} (kept in {place})", flush=True)
+    for outcome in outcomes.values():
+        tried = seen[outcome.what]
+        refused, slowest = sum(a.status == 2 for a in tried), max(a.seconds for a in tried)
+        largest = max(0, *(a.memory for a in tried))
+        outcome.what += f" ({refused} refused, slowest {slowest:.1f} s, {largest >> 20} MiB more)"
+        outcome.limit = f"one line or a whole picture, < {MEMORY >> 30} GiB more, <= {SECONDS} s, nothing left behind"
+        outcome.passed = outcome.defects == 0
+    for same_fault, count in faults.most_common():
+        print(f"    {count} times {same_fault}")
     ldtrefl.set_threads()
-    return outcomes
+    return list(outcomes.values())
 
 
-def write_good_files(folder: Path) -> dict[str, bytes]:
-    """A scene, its meshes in six formats and its picture; their bytes by name."""
-    knot = shapes.make("torus_knot", {"segments": [24, 6]})
-    mesh = trimesh.Trimesh(knot.vertices, knot.faces, process=False)
-    for name in MESHES:
-        if name == "ascii.ply":
-            (folder / name).write_bytes(mesh.export(file_type="ply", encoding="ascii"))
+class Cases:
+    """The good files in a folder, the pictures that come of them, and spoilt ones one after the other."""
+
+    def __init__(self, folder: Path) -> None:
+        """Write the good files and render them: all kernels are compiled and loaded here, on one thread, so that
+        children start from a process that is ready."""
+        self.folder = folder
+        # Threads of a parent do not live on in its children, which would wait for them.
+        oiio.attribute("threads", 1)
+        oiio.attribute("exr_threads", -1)
+        mutations.write_good_meshes(folder)
+        mutations.write_good_pictures(folder)
+        ldtrefl.set_threads(1)
+        things = {name: f'mesh = "{name}"\nfit = 1.0' for name in MESHES} | {"kept": KEPT}
+        for name, thing in things.items():
+            (folder / f"{name}.toml").write_text(scene_text(thing))
+        for path in sorted(folder.glob("*.toml")):
+            for method in ("ldt", "bvh", "envmap"):
+                assert render(path, folder / "good.exr", "--no-cache", "--method", method) == 0, path.name
+        # Maps of both searches; every picture is read once, so that a format that cannot be read shows here.
+        self.kept: dict[str, tuple[bytes, np.ndarray | None]] = {}
+        for search in ("exact", "linear"):
+            options = ("--cache", str(folder / "kept"), "--set", f"search={search}")
+            for _ in range(2):
+                assert render(folder / "kept.toml", folder / "good.exr", *options) == 0
+            (path,) = (p for p in (folder / "kept").iterdir() if p.name not in self.kept)
+            self.kept[path.name] = path.read_bytes(), read(folder / "good.exr")
+        self.searches = dict(zip(self.kept, ("exact", "linear"), strict=True))
+        for name in PICTURES:
+            (folder / "case.toml").write_text(scene_text(KEPT, sky=name, texture=name))
+            assert render(folder / "case.toml", folder / "good.exr", "--no-cache") == 0, name
+        for name in ("good.exr", "case.toml"):
+            (folder / name).unlink()
+        self.good = {str(p.relative_to(folder)): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+
+    def make(self, kind: str, number: int, rng: np.random.Generator) -> Case:
+        """Restore the folder and spoil one file of it; the formats take turns by ``number``."""
+        mutations.restore(self.folder, self.good)
+        (self.folder / LOOP).symlink_to(LOOP)
+        scene = self.folder / "case.toml"
+        makers: dict[str, Callable[[Path, int, np.random.Generator], Case]] = {
+            "scenes": self._scene,
+            "meshes": self._mesh,
+            "pictures": self._picture,
+            "kept maps": self._kept,
+        }
+        return makers[kind](scene, number, rng)
+
+    def _scene(self, scene: Path, number: int, rng: np.random.Generator) -> Case:
+        mesh = list(MESHES)[number % len(MESHES)]
+        scene.write_bytes(mutations.spoilt_scene(scene_text(f'mesh = "{mesh}"\nfit = 1.0'), rng))
+        if rng.random() < NO_FILE:
+            mutations.put_no_file(scene, rng)
+        return Case(scene, "scenes")
+
+    def _mesh(self, scene: Path, number: int, rng: np.random.Generator) -> Case:
+        mesh = list(MESHES)[number % len(MESHES)]
+        scene.write_text(scene_text(f'mesh = "{mesh}"\nfit = 1.0'))
+        # Of a mesh of several files the first as often as all others.
+        parts = MESHES[mesh]
+        victim = parts[0] if len(parts) == 1 or rng.random() < 0.5 else parts[rng.integers(1, len(parts))]
+        self._spoil(victim, rng)
+        return Case(scene, f"meshes, {mesh}")
+
+    def _picture(self, scene: Path, number: int, rng: np.random.Generator) -> Case:
+        picture, as_sky = PICTURES[number // 2 % len(PICTURES)], number % 2 == 0
+        (self.folder / f"spoilt-{picture}").write_bytes(self.good[picture])
+        used = {"sky" if as_sky else "texture": f"spoilt-{picture}"}
+        scene.write_text(scene_text(KEPT.replace("150, 50", "12, 6"), **used))
+        self._spoil(f"spoilt-{picture}", rng)
+        return Case(scene, f"pictures as {'environment' if as_sky else 'texture'}")
+
+    def _kept(self, scene: Path, number: int, rng: np.random.Generator) -> Case:
+        name = list(self.kept)[number % len(self.kept)]
+        data, picture = self.kept[name]
+        options = ("--cache", str(self.folder / "kept"), "--set", f"search={self.searches[name]}")
+        shutil.copy(self.folder / "kept.toml", scene)
+        path = self.folder / "kept" / name
+        if number // len(self.kept) % 2 == 0:
+            path.write_bytes(mutations.kept_of_right_hash(data, rng))
+            return Case(scene, "kept maps, hash repaired", options, always=True)
+        self._spoil(f"kept/{name}", rng)
+        return Case(scene, "kept maps, damaged", options, same=picture)
+
+    def _spoil(self, name: str, rng: np.random.Generator) -> None:
+        path = self.folder / name
+        if rng.random() < NO_FILE:
+            mutations.put_no_file(path, rng)
         else:
-            mesh.export(folder / name)
-    rng = np.random.default_rng(0)
-    ldtrefl.save_image(folder / "sky.png", rng.uniform(0, 1, (8, 16, 3)).astype(np.float32))
-    (folder / "good.toml").write_text(SCENE.replace("MESH", "thing.ply"))
-    for link in ("loop.ply", "loop.toml"):
-        (folder / link).symlink_to(link)
-    return {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()}
+            path.write_bytes(mutations.spoil(path.read_bytes(), name, rng))
 
 
-def mutate(folder: Path, good: dict[str, bytes], kind: str, generator: np.random.Generator) -> Path:
-    """Restore the folder, spoil one file of it, and give the scene to render."""
-    for name, data in good.items():
-        (folder / name).write_bytes(data)
-    scene = folder / "case.toml"
-    mesh = MESHES[generator.integers(len(MESHES))]
-    text = SCENE.replace("MESH", mesh)
-    if kind == "scene":
-        choice = generator.integers(0, 7)
-        lines = text.split("\n")
-        if choice < 3:
-            line = generator.choice([i for i, content in enumerate(lines) if "=" in content])
-            key = lines[line].split("=")[0]
-            lines[line] = f"{key}= {VALUES[generator.integers(len(VALUES))]}"
-            if choice == 2:  # one number of a list
-                numbers = list(re.finditer(r"-?\d+\.\d+", SCENE.replace("MESH", mesh)))
-                at = numbers[generator.integers(len(numbers))]
-                text = text[: at.start()] + VALUES[generator.integers(len(VALUES))] + text[at.end() :]
-                lines = text.split("\n")
-        elif choice == 3:
-            del lines[generator.integers(len(lines))]
-        elif choice == 4:
-            lines.insert(generator.integers(len(lines)), lines[generator.integers(len(lines))])
-        data = "\n".join(lines).encode()
-        if choice == 5:
-            data = data[: generator.integers(len(data))]
-        elif choice == 6:
-            data = flipped(data, generator)
-        scene.write_bytes(data if generator.random() > 0.02 else data.decode("latin-1").encode("utf-16"))
-        return folder / "loop.toml" if generator.random() < 0.01 else scene
-    scene.write_text(text)
-    victim = folder / (mesh if kind == "mesh" else "sky.png")
-    data = good[victim.name]
-    choice = generator.integers(0, 4)
-    if choice == 0:
-        data = data[: generator.integers(len(data))]
-    elif choice == 1:
-        data = flipped(data, generator)
-    elif choice == 2:  # numbers of the header and of the text, made enormous
-        places = list(re.finditer(rb"\d+", data[:2000]))
-        if places:
-            place = places[generator.integers(len(places))]
-            number = (b"-1", b"999999999", b"99999999999999", b"nan")[generator.integers(4)]
-            data = data[: place.start()] + number + data[place.end() :]
-    else:
-        start = int(generator.integers(len(data)))
-        data = data[:start] + generator.bytes(int(generator.integers(1, 200))) + data[start:]
-    victim.write_bytes(data)
-    return scene
+def scene_text(thing: str, sky: str = "8.png", texture: str = "8.png") -> str:
+    """The scene with a thing and its pictures."""
+    return SCENE.replace("THING", thing).replace("SKY", sky).replace("TEXTURE", texture)
 
 
-def flipped(data: bytes, generator: np.random.Generator) -> bytes:
-    """One to eight bytes changed."""
-    changed = bytearray(data)
-    for _ in range(generator.integers(1, 9)):
-        changed[generator.integers(len(changed))] = generator.integers(256)
-    return bytes(changed)
+def render(scene: Path, output: Path, *options: str) -> int:
+    """The command line in this process, its report unheard."""
+    with contextlib.redirect_stdout(io.StringIO()):
+        return cli.main(["render", str(scene), "-o", str(output), "--threads", "1", *options])
 
 
-def attempt(scene: Path, method: str, output: Path) -> int:
-    """The command line in this process."""
-    return cli.main(["render", str(scene), "-o", str(output), "--method", method, "--threads", "1"])
+def read(path: Path) -> np.ndarray | None:
+    """(h, w, 3) float32, as stored; None for what is no picture."""
+    buffer = oiio.ImageBuf(str(path))
+    if buffer.has_error or not buffer.read():
+        return None
+    pixels: np.ndarray = buffer.get_pixels(oiio.FLOAT)
+    return pixels
 
 
-def watched(scene: Path, output: Path) -> tuple[str, int, float, int]:
-    """(what is wrong, status, seconds, bytes) of the command line in a child process."""
+def watched(case: Case, output: Path, parent: int) -> Attempt:
+    """A run of the command line in a child process; ``parent`` bytes are the parent's."""
     output.unlink(missing_ok=True)
-    before = {path.name for path in scene.parent.iterdir()}
-    with tempfile.TemporaryFile() as said:
-        start = time.perf_counter()
+    before = set(output.parent.rglob("*"))
+    with tempfile.TemporaryFile() as said, tempfile.TemporaryFile() as told:
         child = os.fork()
         if child == 0:
             status = 70
             try:
-                signal.alarm(SECONDS)
-                own = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss << 10
-                resource.setrlimit(resource.RLIMIT_AS, (own + (16 << 30), own + (16 << 30)))
-                os.dup2(said.fileno(), 1)
+                signal.alarm(HANGS)
+                resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS + 1))
+                resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+                resource.setrlimit(resource.RLIMIT_AS, (parent + (16 << 30), parent + (16 << 30)))
+                os.dup2(told.fileno(), 1)
                 os.dup2(said.fileno(), 2)
-                status = attempt(scene, "ldt", output)
+                status = render(case.scene, output, *case.options)
             except BaseException:
                 traceback.print_exc()
             finally:
                 os._exit(status)
         _, wait, usage = os.wait4(child, 0)
-        seconds = time.perf_counter() - start
         said.seek(0)
         text = said.read().decode(errors="replace")
     status = os.waitstatus_to_exitcode(wait)
-    memory = usage.ru_maxrss << 10
-    new = {path.name for path in scene.parent.iterdir()} - before
-    fault = ""
+    seconds, memory = usage.ru_utime + usage.ru_stime, (usage.ru_maxrss << 10) - parent
+    new = set(output.parent.rglob("*")) - before - {output}
+    left = sorted(path.name for path in new if path.suffix != ".ldtmaps" or path.name.startswith("."))
+    return Attempt(
+        fault_of_process(status, text, seconds, memory, left) or fault_of_picture(case, output, status),
+        status,
+        seconds,
+        memory,
+    )
+
+
+def fault_of_process(status: int, text: str, seconds: float, memory: int, left: list[str]) -> str:
+    """What is wrong with a status, what was said on standard error, and what was used and left; '' if nothing is."""
+    lines = text.strip().splitlines()
     if status < 0:
-        fault = f"killed by signal {-status}" + (f" after {SECONDS} s" if -status == signal.SIGALRM else "")
-    elif "Traceback" in text:
-        fault = f"a traceback: {text.strip().splitlines()[-1]}"
-    elif status not in (0, 2):
-        fault = f"status {status}"
-    elif status == 2 and len(text.strip().splitlines()) != 1:
-        fault = f"{len(text.strip().splitlines())} lines on error"
-    elif status == 2 and new:
-        fault = f"left {sorted(new)} behind on error"
-    elif status == 0 and not output.is_file():
-        fault = "no picture"
-    elif memory > MEMORY:
-        fault = f"{memory >> 20} MiB"
-    return fault, status, seconds, memory
+        reason = {signal.SIGALRM: f": hung for {HANGS} s", signal.SIGXCPU: f": {SECONDS} s of the processor"}
+        return f"killed by signal {-status}{reason.get(signal.Signals(-status), '')}"
+    if "Traceback" in text:
+        return f"a traceback: {lines[-1]}"
+    if status not in (0, 2):
+        return f"status {status}: {lines[-1] if lines else ''}"
+    if status == 2 and len(lines) != 1:
+        return f"status 2 and {len(lines)} lines: {' / '.join(lines)[:300]}"
+    if status == 0 and (len(lines) > 1 or re.search(r"\w*Warning:|warning:", text)):
+        return f"status 0 and a warning: {lines[0]}"
+    if seconds > SECONDS:
+        return f"{seconds:.0f} s"
+    if memory > MEMORY:
+        return f"{memory / 2**30:.1f} GiB more"
+    return f"left behind: {left}" if left else ""
+
+
+def fault_of_picture(case: Case, output: Path, status: int) -> str:
+    """What is wrong with the picture; '' if nothing is."""
+    if status == 2:
+        if case.same is not None or case.always:
+            return "refused for what was kept"
+        return "a picture on error" if output.exists() else ""
+    picture = read(output)
+    if picture is None:
+        return "no picture"
+    camera = tomllib.loads(case.scene.read_text())["camera"]
+    size = camera.get("height", 512), camera.get("width", 768), 3
+    if picture.shape != size:
+        return f"a picture of shape {picture.shape}, not {size}"
+    if not np.isfinite(picture).all():
+        return f"{int((~np.isfinite(picture)).any(axis=2).sum())} pixels are not finite"
+    if case.same is not None and not np.array_equal(picture, case.same):
+        return "another picture for what was kept"
+    return ""
+
+
+def alike(fault: str) -> str:
+    """A fault without what differs from file to file: numbers, names, quoted words."""
+    fault = re.sub(r"(/[\w.-]+)+|'[^']*'|\"[^\"]*\"", "*", fault)
+    return re.sub(r"-?\d[\d.e+-]*", "0", fault)[:120] if not fault.startswith("killed") else fault
+
+
+def keep(folder: Path, place: Path, case: Case, attempt: Attempt) -> None:
+    """A copy of everything that a fault needs, and how to see it."""
+    shutil.rmtree(place, ignore_errors=True)
+    shutil.copytree(folder, place, symlinks=True, copy_function=_copied)
+    options = " ".join(case.options).replace(str(folder), ".")
+    (place / "README").write_text(f"{case.row}: {attempt.fault}\n\nldtrefl render case.toml -o out.exr {options}\n")
+
+
+def _copied(source: str, target: str) -> None:
+    if os.path.isfile(source):
+        shutil.copy2(source, target)
+    else:  # a pipe
+        os.mkfifo(target)
