@@ -16,15 +16,15 @@ def run(rays: int, pictures: int) -> list[Outcome]:
     outcomes = []
     for gap in (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 0.0, -1e-3, -0.3):
         ball = ldtrefl.Object(shape="sphere", params={"segments": [48, 24]}, translate=(0.0, 0.0, 1.0 + gap))
-        outcomes += judge_reflections(NAME, f"ball {gap:g} above a mirror", on_mirror(ball, pictures), 0.5)
+        outcomes += judge_reflections(NAME, f"ball {gap:g} above a mirror", on_mirror(ball, pictures))
     for gap in (1e-3, 0.0, -1e-3):
         box = ldtrefl.Object(shape="box", scale=0.6, translate=(0.0, 0.0, 0.6 + gap), rotate=(0, 0, 1, 20))
-        outcomes += judge_reflections(NAME, f"box {gap:g} above a mirror", on_mirror(box, pictures), 0.5)
+        outcomes += judge_reflections(NAME, f"box {gap:g} above a mirror", on_mirror(box, pictures))
     for gap in (1e-2, 0.0, -1e-2):
         knot = ldtrefl.Object(
             shape="torus_knot", params={"segments": [96, 16]}, scale=0.7, translate=(1.7 + gap, -0.1, 0.0)
         )
-        outcomes += judge_reflections(NAME, f"knot {gap:g} beside a mirror ball", beside_ball(knot, pictures), 1.0)
+        outcomes += judge_reflections(NAME, f"knot {gap:g} beside a mirror ball", beside_ball(knot, pictures))
     return outcomes
 
 

@@ -9,20 +9,30 @@ import numpy as np
 import ldtrefl
 from ldtrefl import shapes
 
-from .judge import EXACT, Limit, Outcome, judge_mesh, limits, linear_limit, rays_about, tracers
+from .judge import Limit, Outcome, judge_mesh, limits, linear_limit, rays_about, tracers
 
 NAME = "2 directions"
 GRAZING = limits(
-    Limit(radius=0.1, p999=np.inf, why="a ray at 89.9999 degrees moves 600,000 times as far as it is moved aside")
+    Limit(
+        wrong=100.0,
+        p99=np.inf,
+        p999=0.06,
+        why="a ray at 89.9999 degrees moves 600,000 times as far as it is moved aside",
+    ),
+    linear=linear_limit(100.0, "the same, by a texel: finite answers alone"),
 )
+AIMED_SHARE = 20.0
+"""Percent of the rays aimed at vertices and edges that go by a silhouette's, where a hit or a miss is chance."""
 
-AIMED = limits(linear=linear_limit(20.0, "aimed at silhouettes' corners, which are blocks of a texel"))
+AIMED = limits(
+    Limit(wrong=AIMED_SHARE, p99=np.inf, why="a hit or a miss at a silhouette's vertex is chance"),
+    linear=linear_limit(AIMED_SHARE, "aimed at silhouettes' corners, which are blocks of a texel"),
+)
 AIMED["bvh"] = dataclasses.replace(
-    EXACT,
-    defects=False,
-    wrong=20.0,
-    why="Warp's tree lets one in 300 rays that are aimed exactly at a vertex or an edge pass between two boxes; "
-    "a hit or a miss at a silhouette's vertex is chance",
+    AIMED["exact"],
+    defects=1.0,
+    p999=np.inf,
+    why="Warp's tree lets one in 300 rays that are aimed exactly at a vertex or an edge pass between two boxes",
 )
 """For rays aimed at vertices and edges as exactly as float32 can."""
 

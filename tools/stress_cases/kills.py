@@ -10,6 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import OpenImageIO as oiio
 
 import ldtrefl
 from ldtrefl import shapes
@@ -19,11 +20,17 @@ from ldtrefl.image import load_image
 from .judge import Outcome
 
 NAME = "13 kills"
+FOUND = 0.2
+"""Share of the kills after which a file must be there: where none ever is, none is ever looked at."""
 
 
 def run(rays: int, pictures: int) -> list[Outcome]:
     """A kill for every two of ``pictures`` pixels, of each kind of file."""
     kills = max(8, pictures // 2)
+    # Threads of a parent do not live on in its children, which would wait for them and write nothing.
+    oiio.attribute("threads", 1)
+    oiio.attribute("exr_threads", -1)
+    ldtrefl.set_threads(1)
     generator = np.random.default_rng(13)
     image = generator.uniform(0, 1, (300, 400, 3)).astype(np.float32)
     mesh = shapes.make("torus_knot", {"segments": [96, 16]})
@@ -56,7 +63,7 @@ def run(rays: int, pictures: int) -> list[Outcome]:
             start = time.perf_counter()
             write(path)
             seconds = time.perf_counter() - start
-            outcome = Outcome(NAME, name, "writer", limit="whole or absent")
+            outcome = Outcome(NAME, name, "writer", limit=f"whole or absent; there in >= {100 * FOUND:g}%")
             absent = 0
             for _ in range(kills):
                 path.unlink(missing_ok=True)
@@ -77,7 +84,8 @@ def run(rays: int, pictures: int) -> list[Outcome]:
                 elif not is_whole(path):
                     outcome.defects += 1
             outcome.what += f" ({absent} absent)"
-            outcome.passed = outcome.defects == 0
+            outcome.passed = outcome.defects == 0 and outcome.tried - absent >= FOUND * outcome.tried
             outcome.seconds = time.perf_counter() - start
             outcomes.append(outcome)
+    ldtrefl.set_threads()
     return outcomes

@@ -11,7 +11,10 @@ from .judge import LINEAR, Limit, Outcome, Truth, describe, judge, judge_mesh, l
 
 NAME = "8 parameters"
 ANY = limits(linear=linear_limit(100.0, "a texel may be as large as the object: finite answers alone"))
-THIN = limits(Limit(radius=0.1, p999=0.1, why="a ten-thousandth as high as wide"), linear=ANY["linear"])
+THIN = limits(
+    Limit(place=1.0, wrong=0.5, why="a ten-thousandth as high as wide: barycentrics are those of a rounded position"),
+    linear=ANY["linear"],
+)
 
 
 def run(rays: int, pictures: int) -> list[Outcome]:

@@ -8,10 +8,15 @@ import ldtrefl
 from ldtrefl import shapes
 
 from .judge import Outcome
-from .pictures import judge_reflections
+from .pictures import Held, judge_reflections, surroundings
 
 NAME = "7 reflectors"
 MIRROR = ldtrefl.Material(albedo=(0.05,) * 3, mirror=(0.9,) * 3)
+HELD = {
+    "strongly bent under one pixel": Held(linear_percent=5.0, reflector=0.01),
+    # Smaller than what lies between the centres of pixels: it is not seen.
+    "a tenth of a pixel": Held(reflector=0.0, hits=0.0),
+}
 
 
 def run(rays: int, pictures: int) -> list[Outcome]:
@@ -43,8 +48,9 @@ def run(rays: int, pictures: int) -> list[Outcome]:
                     ldtrefl.Object(
                         shape="torus_knot", params={"segments": [96, 16]}, scale=0.6, translate=(1.5, -1.4, 0.1)
                     ),
+                    surroundings(),
                 ),
             )
             shading = "smooth" if smooth else "faceted"
-            outcomes += judge_reflections(NAME, f"{what}, {shading}", scene, 1.0, 25.0)
+            outcomes += judge_reflections(NAME, f"{what}, {shading}", scene, HELD.get(what, Held(linear_percent=5.0)))
     return outcomes
