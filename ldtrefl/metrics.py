@@ -77,25 +77,34 @@ class HitErrors:
     """Rays that hit something where the truth hits nothing, in percent of true hits."""
     wrong_misses: float
     """Rays that hit nothing where the truth hits, in percent of true hits."""
+    wrong_objects: float
+    """Rays that hit another object than the truth's, in percent of true hits."""
     median: float
-    """Median distance error along the ray where both hit, in texels."""
+    """Median distance error along the ray where both hit, whatever they hit, in texels of the truth's object. A
+    distance that is no number counts as infinite."""
     p99: float
     """99th percentile of the same."""
 
 
 def hit_errors(hits: FirstHits, truth: FirstHits, texel_sizes: np.ndarray, mask: np.ndarray) -> HitErrors:
-    """Compare first hits; ``texel_sizes`` (objects,) is the length of a texel of each object, in world units."""
+    """Compare first hits on the mask; ``texel_sizes`` (objects,) is the length of a texel of each object in the world.
+
+    Where the truth hits nothing at all, any hit makes infinitely many wrong ones.
+    """
     hit, true_hit = (hits.object >= 0) & mask, (truth.object >= 0) & mask
     true_hits = int(true_hit.sum())
     if true_hits == 0:
         wrong = 0.0 if not hit.any() else float("inf")
-        return HitErrors(wrong, 0.0, float("nan"), float("nan"))
+        return HitErrors(wrong, 0.0, 0.0, float("nan"), float("nan"))
     both = hit & true_hit
     errors = np.abs(hits.distance[both].astype(float) - truth.distance[both]) / texel_sizes[truth.object[both]]
-    median, p99 = np.percentile(errors, [50, 99]) if errors.size else (np.nan, np.nan)
+    errors[np.isnan(errors)] = np.inf
+    # Nearest ranks: between a number and infinity there is nothing to interpolate.
+    median, p99 = np.percentile(errors, [50, 99], method="inverted_cdf") if errors.size else (np.nan, np.nan)
     return HitErrors(
         100.0 * float((hit & ~true_hit).sum()) / true_hits,
         100.0 * float((true_hit & ~hit).sum()) / true_hits,
+        100.0 * float((hits.object != truth.object)[both].sum()) / true_hits,
         float(median),
         float(p99),
     )
@@ -106,7 +115,12 @@ def reprojection_errors(hits: FirstHits, truth: FirstHits, gbuffer: GBuffer) -> 
 
     A hit in front of the surface or behind it shows what lies beside the true point: sideways to the ray by the
     distance along it times sine and cosine of its angle with the surface. Compared with the distance between
-    neighbouring pixels' rays there, the mean of the one to the right and the one below.
+    neighbouring pixels' rays there, the geometric mean of the one to the right and the one below.
+
+    Left out are rays whose right or lower neighbour sees another mirror or none, and those of the last row and column:
+    they have no such distance. A ray that ends on another object than the truth's is measured like any other, by how
+    far along the ray it is off; ``hit_errors`` counts it. A distance that is no number counts as infinite, and so does
+    any error where neighbouring rays meet in one point.
     """
     scene, shape = gbuffer.scene, truth.shape
     pixel = truth.rays.pixel.numpy()
@@ -135,4 +149,6 @@ def reprojection_errors(hits: FirstHits, truth: FirstHits, gbuffer: GBuffer) -> 
         length = np.maximum(np.linalg.norm(normal, axis=1), np.finfo(float).tiny)
         cosine = np.clip(np.abs((normal * d[here]).sum(axis=1)) / length, 0.0, 1.0)
         errors[here] *= cosine * np.sqrt(1.0 - cosine**2)
-    return errors[footprint > 0.0] / footprint[footprint > 0.0]
+    errors[np.isnan(errors)] = np.inf
+    # Where neighbouring rays meet, no error is none, and any is without measure.
+    return np.divide(errors, footprint, out=np.where(errors > 0.0, np.inf, 0.0), where=footprint > 0.0)

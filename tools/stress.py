@@ -63,16 +63,16 @@ def table(outcomes: list[Outcome], seconds: float) -> str:
     )
     lines += [
         "",
-        "Disagree: hits too many, too few, or elsewhere. Explained: those where float64 itself gives that answer for a ray "
-        "moved aside by at most the texels under *within*; the others are defects. Misnamed: hits whose triangle, "
-        "barycentrics or normal are not those of the place. p99 is of all rays that hit and should, p99.9 and worst of all "
-        "but the explained.",
+        "Disagree: hits too many, too few, or elsewhere. Explained: those where float64 itself gives that answer for a "
+        "ray moved aside by at most the texels under *within*; the others are defects. Misnamed: hits whose triangle, "
+        "barycentrics or normal are not those of the place. p99 is of all rays that hit and should, p99.9 and worst of "
+        "all but the explained.",
     ]
     lines += [
         "",
-        "| case | what | by | tried | wrong hits | wrong misses | disagree | explained | within | defects | misnamed | ",
+        "| case | what | by | tried | wrong hits | wrong misses | disagree | explained | within | defects | ",
     ]
-    lines[-1] += "p99 | p99.9 | worst | non-finite | s | limit |  |"
+    lines[-1] += "misnamed | p99 | p99.9 | worst | non-finite | s | limit |  |"
     lines += ["|" + "---|" * 18]
     for o in outcomes:
         held = "" if o.passed else "**beyond**"
