@@ -105,11 +105,13 @@ def test_two_processes_write_at_once(tmp_path: Path) -> None:
     cache = MapCache(tmp_path)
     for writer in writers:
         writer.start()
+    found = 0
     while any(writer.is_alive() for writer in writers):
         entry = cache.load("b" * 32)
         if entry is not None:
+            found += 1
             assert (entry.arrays["x"] == entry.arrays["x"][0]).all()
-    assert [writer.exitcode for writer in writers] == [0, 0]
+    assert [writer.exitcode for writer in writers] == [0, 0] and found > 0
     assert cache.load("b" * 32) is not None and len(list(tmp_path.iterdir())) == 1
 
 

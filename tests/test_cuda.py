@@ -30,6 +30,10 @@ def all_kernels() -> list[wp.Kernel]:
     return [kernel for kernel in launch.KERNELS if kernel.func.__module__.startswith("ldtrefl.")]
 
 
+def test_kernels_are_found() -> None:
+    assert len({kernel.module.name for kernel in all_kernels()}) >= 40
+
+
 @pytest.mark.parametrize("kernel", all_kernels(), ids=lambda kernel: kernel.module.name)
 def test_kernel_compiles_to_ptx(kernel: wp.Kernel, tmp_path: Path) -> None:
     launch.resolve_device(None)

@@ -88,6 +88,7 @@ def test_no_ray_is_lost(bend: float) -> None:
     launch.launch(cull_runs, len(origins), [rays, records, nothing, nothing, bits, none_kept], device)
     kept = np.unpackbits(bits.numpy().view(np.uint8), axis=1, bitorder="little")[:, :SPHERES] != 0
     truth = np.stack([meet(origins, directions, c, r).any(axis=1) for c, r in zip(centre, radius, strict=True)], 1)
+    assert 0.02 < truth.mean() < 0.98
     assert not (truth & ~kept).any(), f"{(truth & ~kept).sum()} of {truth.sum()} lost"
     assert kept.sum() <= 1.01 * truth.sum(), "a run keeps what none of its rays meets"
 
@@ -108,6 +109,7 @@ def test_flat_is_exact_for_flat_mirrors() -> None:
         rays = reflected({name: values[span] for name, values in mirrors.items()}, 200, flat=True)
         truth[span] = meet(*rays, centre[span, None], (1 - 1e-4) * radius[span, None]).any(axis=1)  # not by rounding
     shown = flat.numpy() != 0
+    assert 0.02 < truth.mean() < 0.98
     assert (truth & ~shown).mean() < 1e-4
     assert (shown & ~truth).mean() < 0.02
 

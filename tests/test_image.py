@@ -48,18 +48,31 @@ def test_every_kind_of_png_is_read_as_rgb(tmp_path: Path, mode: str) -> None:
 def test_pictures_that_cannot_be_read(tmp_path: Path) -> None:
     save_image(tmp_path / "a.png", noise(64, 64))
     whole = (tmp_path / "a.png").read_bytes()
-    for length in (0, 10, 40, len(whole) // 2):
+    for length, fault in (
+        (0, "not a picture"),
+        (10, "not a picture"),
+        (40, "not a picture"),
+        (len(whole) // 2, "cut off"),
+    ):
         (tmp_path / "cut.png").write_bytes(whole[:length])
-        with pytest.raises(InputError, match=r"cut\.png"):
+        with pytest.raises(InputError, match=rf"cut\.png: .*{fault}"):
             load_image(tmp_path / "cut.png")
     with pytest.raises(InputError, match="no such picture"):
         load_image(tmp_path / "none.png")
 
 
-@pytest.mark.parametrize("name", ["a.jpg", "a", "folder.png", "none/a.png"])
-def test_places_that_cannot_be_written(tmp_path: Path, name: str) -> None:
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("a.jpg", r"a\.jpg: a picture's name ends in \.png or \.exr"),
+        ("a", r"a: a picture's name ends in \.png or \.exr"),
+        ("folder.png", r"folder\.png: is a folder"),
+        ("none/a.png", r"a\.png: the folder .*none does not exist"),
+    ],
+)
+def test_places_that_cannot_be_written(tmp_path: Path, name: str, message: str) -> None:
     (tmp_path / "folder.png").mkdir()
-    with pytest.raises(InputError):
+    with pytest.raises(InputError, match=message):
         save_image(tmp_path / name, noise())
 
 

@@ -122,8 +122,8 @@ def moved_along(truth: FirstHits, off: Any) -> FirstHits:
 @pytest.mark.parametrize("tilt", [20.0, 45.0, 70.0])
 @pytest.mark.parametrize("off", [-0.01, 0.02])
 def test_what_lies_behind_its_place_is_seen_pixels_beside_it(tilt: float, off: float) -> None:
-    """On the axis a point ``off`` along the ray shows what lies ``off * sin * cos`` beside. A pixel is as wide there as in
-    a picture taken through the mirror: the camera's height plus the sheet's, times the angle of a pixel."""
+    """On the axis a point ``off`` along the ray shows what lies ``off * sin * cos`` beside. A pixel is as wide there as
+    in a picture taken through the mirror: the camera's height plus the sheet's, times the angle of a pixel."""
     truth, gbuffer = mirrored_sheet(tilt)
     assert truth.distance[SIDE // 2, SIDE // 2] == pytest.approx(CEILING, rel=1e-5)
     errors = reprojection_errors(moved_along(truth, off), truth, gbuffer)

@@ -39,6 +39,7 @@ def test_benchmark_writes_what_it_promises(tmp_path: Path) -> None:
     assert {path.name for path in tmp_path.iterdir()} == plots | {"benchmark.json", "benchmark.md"}
     result = json.loads((tmp_path / "benchmark.json").read_text())
     assert {"machine", "meshes", "error_against_time", "stages", "scaling", "paper"} <= set(result)
+    assert result["meshes"] and result["paper"]
     for row in result["meshes"]:
         assert row["errors"]["ldt exact"]["wrong_hits"] + row["errors"]["ldt exact"]["wrong_misses"] <= 0.01
         assert {"median", "min", "max"} <= set(row["milliseconds"]["bvh"])
@@ -52,6 +53,7 @@ def test_ablation_writes_what_it_promises(tmp_path: Path) -> None:
     result = json.loads((tmp_path / "ablation.json").read_text())
     assert {row["skip"] for row in result["skips"]} == set(skips.names())
     assert all(row["same"] for row in result["skips"])
+    assert result["culling"] and all(row["handed"] > 0 for row in result["culling"])
     assert all(row["lost"]["safe"] == 0 for row in result["culling"])
     assert all(row["handed"] <= 1.5 * row["entering"] for row in result["culling"])
 

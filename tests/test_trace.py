@@ -154,7 +154,7 @@ def test_barycentrics_and_normal_are_the_hit_triangles() -> None:
 
 def test_wrong_arrays_are_refused() -> None:
     for tracer in all_tracers(shapes.make("box")):
-        with pytest.raises(ldtrefl.InputError, match="shape"):
+        with pytest.raises(ldtrefl.InputError, match=r"origins must have shape \(n, 3\)"):
             tracer.trace(np.zeros((3, 2)), np.zeros((3, 2)))
         with pytest.raises(ldtrefl.InputError, match="2 origins for 3 directions"):
             tracer.trace(np.zeros((2, 3)), np.zeros((3, 3)))
