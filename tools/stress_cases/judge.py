@@ -275,7 +275,9 @@ def judge(
     is_explained = np.zeros(len(t), bool)
     radius, defects = 0.0, 0
     for number, i in enumerate(disagree if limit.defects < 100 else ()):
-        found = explaining_radius(truth, origins[i], directions[i], t[i], int(hits.triangle[i]), texel, limit.slips)
+        found = np.inf  # nothing explains what is no answer
+        if not broken[i]:
+            found = explaining_radius(truth, origins[i], directions[i], t[i], int(hits.triangle[i]), texel, limit.slips)
         radius = max(radius, found)
         is_explained[i] = found <= limit.radius
         defects += not is_explained[i]
