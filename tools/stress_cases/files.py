@@ -223,6 +223,8 @@ class Cases:
         # Of a mesh of several files the first as often as all others.
         parts = MESHES[mesh]
         victim = parts[0] if len(parts) == 1 or rng.random() < 0.5 else parts[rng.integers(1, len(parts))]
+        # The parent has read the good mesh: a new time has it read again, whichever of its files is spoilt.
+        os.utime(self.folder / parts[0])
         self._spoil(victim, rng)
         return Case(scene, f"meshes, {mesh}")
 
@@ -353,7 +355,7 @@ def fault_of_picture(case: Case, output: Path, status: int) -> str:
 def alike(fault: str) -> str:
     """A fault without what differs from file to file: numbers, names, quoted words."""
     fault = re.sub(r"(/[\w.-]+)+|'[^']*'|\"[^\"]*\"", "*", fault)
-    return re.sub(r"-?\d[\d.e+-]*", "0", fault)[:120] if not fault.startswith("killed") else fault
+    return re.sub(r"-?\b(0x[0-9a-f]+|\d[\d.e+-]*)", "0", fault)[:120] if not fault.startswith("killed") else fault
 
 
 def keep(folder: Path, place: Path, case: Case, attempt: Attempt) -> None:
