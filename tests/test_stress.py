@@ -197,3 +197,15 @@ def test_pictures_that_are_none_are_found(tmp_path: Path) -> None:
     broken[1, 1, 0] = np.nan
     ldtrefl.save_image(out, broken)
     assert "not finite" in fault_of_picture(case, out, 0)
+
+
+def test_triangles_near_a_ray_are_all_that_rays_beside_it_meet(traced: tuple) -> None:
+    truth, origins, directions, *_ = traced
+    texel = 2 * truth.half / 256
+    rng = np.random.default_rng(2)
+    for o, d in zip(origins[:100].astype(float), directions[:100].astype(float), strict=True):
+        few = truth.near(o, d, 3 * texel)
+        aside = rng.normal(size=(20, 3))
+        beside = o + 3 * texel * aside / np.linalg.norm(aside, axis=1, keepdims=True)
+        ways = np.broadcast_to(d, (20, 3))
+        np.testing.assert_array_equal(few.hits(beside, ways), truth.hits(beside, ways))

@@ -11,6 +11,7 @@ the object, whatever the map's resolution.
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import time
 from collections.abc import Callable, Iterator
@@ -178,6 +179,23 @@ class Truth:
         """Whether the answers are brute force's."""
         return self._embree is None
 
+    def near(self, origin: np.ndarray, direction: np.ndarray, reach: float) -> Truth:
+        """The truth of the triangles alone that rays within ``reach`` of a ray can meet, all parallel to it."""
+        if not self.is_brute:
+            return self
+        o, d = (origin - self.centre) / self.half, direction / np.abs(direction).max()
+        d = d / np.linalg.norm(d)
+        middle = self._a + (self._u + self._v) / 3
+        corners = (self._a, self._a + self._u, self._a + self._v)
+        size = np.max([np.linalg.norm(corner - middle, axis=1) for corner in corners], axis=0)
+        aside = middle - o
+        aside = np.linalg.norm(aside - (aside @ d)[:, None] * d, axis=1)
+        # A millionth more, for rounding.
+        is_near = aside <= 1.000001 * (size + reach / self.half) + 1e-6
+        few = copy.copy(self)
+        few._a, few._u, few._v = (part[is_near] for part in (self._a, self._u, self._v))
+        return few
+
     def hits(self, origins: np.ndarray, directions: np.ndarray) -> np.ndarray:
         """(n,) float64 distances in lengths of each direction, +inf on a miss; origins and directions (n, 3)."""
         return self.first_hits(origins, directions)[0]
@@ -203,6 +221,8 @@ class Truth:
 
     def _by_force(self, o: np.ndarray, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         t, triangle = np.full(len(o), np.inf), np.full(len(o), -1)
+        if not len(self._a):
+            return t, triangle
         step = max(1, 1_000_000 // len(self._a))
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             for first in range(0, len(o), step):
@@ -353,6 +373,7 @@ def explaining_radius(
         ways[:4] = np.array([1.0, 0.5, 0.1, 0.01])[:, None] * inwards
     ways[4:] /= np.linalg.norm(ways[4:], axis=1, keepdims=True)
     ways[:4] /= max(float(np.linalg.norm(ways[0])), 1e-300)
+    truth = truth.near(o, d, RADII[-1] * texel)
     for radius in RADII:
         moved = np.sort(truth.hits(o + radius * texel * ways, np.broadcast_to(d, (MOVED, 3))))
         with np.errstate(invalid="ignore"):
