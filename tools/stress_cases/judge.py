@@ -259,17 +259,20 @@ def judge_mesh(
     directions: np.ndarray,
     held_to: dict[str, Limit] | None = None,
     resolution: int = TEXELS,
+    least: float = 0.02,
 ) -> list[Outcome]:
-    """Every tracer against the truth on the same rays."""
+    """Every tracer against the truth on the same rays, of which a share of ``least`` must truly hit; none if it is 0."""
     origins, directions = (np.ascontiguousarray(x, np.float32) for x in (origins, directions))
     truth = Truth(mesh)
     true_t = truth.hits(origins, directions)
+    share = float(np.isfinite(true_t).mean())
     outcomes = []
     for by, trace in tracers(mesh, resolution):
         start = time.perf_counter()
         hits = trace(origins, directions)
         outcome = judge(truth, origins, directions, true_t, hits, (held_to or limits())[by])
         outcome.case, outcome.what, outcome.by = case, what, by
+        outcome.passed &= share >= least if least > 0 else share == 0
         outcome.seconds = time.perf_counter() - start
         outcomes.append(outcome)
     return outcomes

@@ -7,9 +7,18 @@ import numpy as np
 import ldtrefl
 from ldtrefl import shapes
 
-from .judge import DENSE, TEXELS, Outcome, judge_mesh, limits, linear_limit, moved, rays_about
+from .judge import DENSE, TEXELS, Limit, Outcome, judge_mesh, limits, linear_limit, moved, rays_about
 
 NAME = "4 meshes"
+NEEDLES = limits(
+    Limit(
+        wrong=60.0,
+        p99=np.inf,
+        place=np.inf,
+        why="aimed at what is a millionth wide: a hit or a miss is chance, and so are barycentrics of a rounded position",
+    ),
+    linear=linear_limit(100.0, "thinner than a texel: finite answers alone"),
+)
 HOLES = limits(linear=linear_limit(20.0, "an edge in every texel's way"))
 
 
@@ -24,8 +33,12 @@ def run(rays: int, pictures: int) -> list[Outcome]:
     """``rays`` rays a mesh."""
     outcomes = []
     for name, mesh in made().items():
-        held_to = {"dense": DENSE, "dense, a part wound inwards": DENSE, "holes": HOLES}.get(name)
-        outcomes += judge_mesh(NAME, name, mesh, *rays_about(mesh, rays, 30), held_to)
+        held_to = {"dense": DENSE, "dense, a part wound inwards": DENSE, "holes": HOLES, "needles": NEEDLES}.get(name)
+        origins, directions = rays_about(mesh, rays, 30)
+        if name == "needles":  # nothing meets them by chance
+            chosen = mesh.faces[np.random.default_rng(32).integers(0, len(mesh.faces), rays)]
+            directions = (mesh.vertices[chosen].mean(axis=1) - origins).astype(np.float32)
+        outcomes += judge_mesh(NAME, name, mesh, origins, directions, held_to)
     return outcomes + [patched(name, mesh) for name, mesh in made().items() if name.startswith("dense")] + refused()
 
 

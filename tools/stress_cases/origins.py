@@ -41,5 +41,5 @@ def run(rays: int, pictures: int) -> list[Outcome]:
     for sizes in (1e2, 1e4, 1e7):
         towards = in_box - sizes * directions
         outcomes += judge_mesh(NAME, f"{sizes:g} sizes away", mesh, towards, in_box - towards.astype(np.float32))
-    outcomes += judge_mesh(NAME, "behind everything", mesh, 3 * directions, directions)
+    outcomes += judge_mesh(NAME, "behind everything", mesh, 3 * directions, directions, least=0.0)
     return outcomes
