@@ -194,3 +194,17 @@ def test_no_error_depends_on_the_size_of_the_scene() -> None:
     assert beside[0].device_units_per_world_unit < 0.1 * alone[0].device_units_per_world_unit
     a, b = (reprojection_errors(moved_along(truth, 0.05), truth, gbuffer) for truth, gbuffer in (alone, beside))
     np.testing.assert_allclose(a, b, rtol=2e-2)
+
+
+def test_a_pixel_is_the_mean_of_the_ray_to_the_right_and_the_one_below(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rays four units apart sideways and nine downwards: six, their geometric mean."""
+    truth, gbuffer = mirrored_sheet(45.0)
+
+    def apart(o: np.ndarray, _d: np.ndarray, other: np.ndarray, *_: Any) -> np.ndarray:
+        step = np.abs(other - o)
+        return np.where(step[:, 0] > step[:, 1], 4.0, 9.0)
+
+    monkeypatch.setattr(metrics, "distance_across", apart)
+    errors = reprojection_errors(moved_along(truth, 0.6), truth, gbuffer).reshape(SIDE - 1, SIDE - 1)
+    expected = 0.6 * gbuffer.scene.device_units_per_world_unit * 0.5 / 6.0  # sine times cosine of 45 degrees
+    assert errors[SIDE // 2, SIDE // 2] == pytest.approx(expected, rel=1e-3)

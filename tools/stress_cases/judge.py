@@ -261,7 +261,7 @@ def judge_mesh(
     resolution: int = TEXELS,
     least: float = 0.02,
 ) -> list[Outcome]:
-    """Every tracer against the truth on the same rays, of which a share of ``least`` must truly hit; none if it is 0."""
+    """Every tracer against the truth on the same rays, of which a share ``least`` must truly hit; none if it is 0."""
     origins, directions = (np.ascontiguousarray(x, np.float32) for x in (origins, directions))
     truth = Truth(mesh)
     true_t = truth.hits(origins, directions)

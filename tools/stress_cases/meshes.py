@@ -15,7 +15,7 @@ NEEDLES = limits(
         wrong=60.0,
         p99=np.inf,
         place=np.inf,
-        why="aimed at what is a millionth wide: a hit or a miss is chance, and so are barycentrics of a rounded position",
+        why="aimed at what is a millionth wide: hit or miss is chance, and so are barycentrics of a rounded place",
     ),
     linear=linear_limit(100.0, "thinner than a texel: finite answers alone"),
 )
