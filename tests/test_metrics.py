@@ -208,3 +208,15 @@ def test_a_pixel_is_the_mean_of_the_ray_to_the_right_and_the_one_below(monkeypat
     errors = reprojection_errors(moved_along(truth, 0.6), truth, gbuffer).reshape(SIDE - 1, SIDE - 1)
     expected = 0.6 * gbuffer.scene.device_units_per_world_unit * 0.5 / 6.0  # sine times cosine of 45 degrees
     assert errors[SIDE // 2, SIDE // 2] == pytest.approx(expected, rel=1e-3)
+
+
+def test_the_angle_is_that_with_the_turned_surface(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rays of the top row meet a sheet that is turned away from them, by their own angle more than on the axis."""
+    tilt = 20.0
+    truth, gbuffer = mirrored_sheet(tilt)
+    monkeypatch.setattr(metrics, "distance_across", lambda o, *_: np.ones(len(o)))
+    errors = reprojection_errors(moved_along(truth, 0.1), truth, gbuffer).reshape(SIDE - 1, SIDE - 1)
+    ray = np.arctan((1 - 1 / SIDE) * np.tan(np.radians(FIELD / 2)))
+    angle = np.radians(tilt) + ray
+    expected = 0.1 * gbuffer.scene.device_units_per_world_unit * np.sin(angle) * np.cos(angle)
+    assert errors[0, SIDE // 2] == pytest.approx(expected, rel=1e-3)
