@@ -1,4 +1,4 @@
-"""Numerical stability under stress: 13 cases, each against an answer that does not depend on what is tested.
+"""Numerical stability under stress: a case a file, each against an answer that does not depend on what is tested.
 
     python tools/stress.py                 # forty minutes; writes tools/results/stress.json and stress.md
     python tools/stress.py --only fuzz     # one case, nothing written
@@ -47,6 +47,7 @@ CASES: dict[str, tuple[Size, Size]] = {  # name of the module -> full and quick 
     "fuzz": (Size(10_000_000, 0), Size(100_000, 0)),
     "files": (Size(0, 10_000), Size(0, 80)),
     "kills": (Size(0, 64), Size(0, 16)),
+    "bounds": (Size(0, 1), Size(0, 7)),
 }
 
 
