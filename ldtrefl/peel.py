@@ -47,10 +47,15 @@ class PeelTarget:
     first_texel: wp.vec3i
 
 
+MIX_X = wp.constant(wp.uint32(0x9E3779B1))
+MIX_Y = wp.constant(wp.uint32(0x85EBCA77))
+"""Odd multipliers of a hash (xxHash's primes). A literal in a kernel would be an int32, which these do not fit."""
+
+
 @wp.func
 def place_hash(x: int, y: int, z: int) -> int:
     """32 well-mixed bits that are the same for vertices in one place."""
-    h = wp.uint32(x) * wp.uint32(0x9E3779B1) + wp.uint32(y) * wp.uint32(0x85EBCA77) + wp.uint32(z)
+    h = wp.uint32(x) * MIX_X + wp.uint32(y) * MIX_Y + wp.uint32(z)
     h = (h ^ (h >> wp.uint32(15))) * wp.uint32(0x2C1B3C6D)
     h = (h ^ (h >> wp.uint32(12))) * wp.uint32(0x297A2D39)
     return int(h ^ (h >> wp.uint32(15)))
