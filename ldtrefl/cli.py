@@ -31,6 +31,7 @@ from ldtrefl.layers import draw_layers
 from ldtrefl.ldt import DEFAULT_RESOLUTION, peel_mesh
 from ldtrefl.mesh import Mesh, load_mesh
 from ldtrefl.methods import all_methods, find_method
+from ldtrefl.native import log_on_stderr
 from ldtrefl.render import Frame, Renderer
 from ldtrefl.scene import Scene, load_scene
 
@@ -64,7 +65,8 @@ Threads = Annotated[int | None, typer.Option(help="CPU threads; all cores if not
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line; the exit status."""
     try:
-        result = app(arguments, standalone_mode=False, prog_name="ldtrefl")
+        with log_on_stderr():
+            result = app(arguments, standalone_mode=False, prog_name="ldtrefl")
     except (InputError, TyperException) as error:
         message = error.format_message() if isinstance(error, TyperException) else str(error)
         print(f"ldtrefl: {' '.join(message.split())}", file=sys.stderr)
@@ -186,6 +188,8 @@ def info(
         _scene_info(load_scene(file))
     else:
         _mesh_info(_mesh_or_shape(file))
+    if note := launch.threading_note():
+        _console().print(note, markup=False)
 
 
 @cache_commands.command("info")

@@ -7,19 +7,34 @@ at it. The helpers do, too: they go on looking at the board for a moment after e
 
 Each thread has its own run of a job's slices, the same in every launch, and takes others' when those are done: what one
 kernel wrote, the next then mostly reads in the same core's cache.
+
+That calls kernels as Warp does (``warp_abi.py``). Before the first such call ``why_not_native`` tries it; where it does
+not work, a ``Pool`` of Python threads launches the slices by Warp's public functions.
 """
 
 from __future__ import annotations
 
 import atexit
 import ctypes
+import itertools
+import os
 import threading
 import time
+import weakref
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from typing import Any
 
+import numpy as np
 import warp as wp
+
+from ldtrefl import kernel_cache, warp_abi
 
 SLICES = 64
 """Slices of a job for each thread. To take one costs 50 nanoseconds; the last ones make others wait."""
+
+POOL_SLICES = 4
+"""The same for a pool of Python threads, to whom a slice costs 100 microseconds."""
 
 PATIENCE = 5_000
 """Looks at a board with nothing to do before a thread sleeps: some 200 microseconds, longer than what Python does
@@ -63,7 +78,9 @@ class _Board(ctypes.Structure):
     )
 
 
-WORK = """
+WORK = (
+    warp_abi.CALL_KERNEL
+    + """
     struct Job { uint64_t kernel, arguments, argument_bytes, first, items, slices; };
     struct Number { uint64_t value, rest[7]; };
     struct Board { Job job; uint64_t arguments[4096 / 8]; Number threads, finished, turns[1]; };
@@ -113,9 +130,8 @@ WORK = """
                     continue;
                 const uint64_t begin = slice * job.items / job.slices;
                 const uint64_t items = (slice + 1) * job.items / job.slices - begin;
-                wp::launch_bounds_t<1> bounds = {{(uint32_t)items}, (size_t)items, 1};
                 *(int*)arguments = (int)(job.first + begin);
-                ((void (*)(void*, void*))job.kernel)(&bounds, arguments);
+                Warp::call_kernel(job.kernel, items, arguments);
                 __atomic_fetch_add(&board.finished.value, 1, __ATOMIC_RELEASE);
                 looks = 0;
                 turn = __atomic_load_n(place, __ATOMIC_ACQUIRE);
@@ -128,6 +144,7 @@ WORK = """
 #endif
     }
 """
+)
 
 
 @wp.func_native(WORK)
@@ -140,6 +157,27 @@ def work_at(board_address: wp.uint64, job_address: wp.uint64, thread: wp.uint64,
     work(board_address, job_address, thread, patience)
 
 
+Run = Callable[[int, int], None]
+"""A kernel that is ready to be run for some items: the first one's number, and how many."""
+
+
+def recorded(kernel: wp.Kernel, count: int, arguments: Sequence[Any], cpu: wp.Device) -> wp.Launch:
+    """A launch of ``kernel(first, *arguments)`` on the CPU that has not been made yet."""
+    kernel_cache.load(kernel, cpu)
+    return wp.launch(kernel, dim=count, inputs=[0, *arguments], device=cpu, record_cmd=True)
+
+
+def alone(command: wp.Launch) -> Run:
+    """Run a recorded launch on the thread that asks for it."""
+
+    def run(first: int, items: int) -> None:
+        command.set_param_at_index(0, first)
+        command.set_dim(items)
+        command.launch()
+
+    return run
+
+
 class Crew:
     """A thread that launches, and its helpers. Where several launch at once, one has the helpers."""
 
@@ -150,41 +188,52 @@ class Crew:
         self._board.threads.value = threads
         self._job = _Job()
         self._is_free = threading.Lock()
-        self._blocks: dict[wp.Kernel, type[ctypes.Structure]] = {}
-        self._work = [self._work_of(thread) for thread in range(threads)] if threads > 1 else []
+        self._calls: dict[wp.Kernel, warp_abi.NativeCall] = {}
+        self._work = [self._work_of(thread) for thread in range(threads)]
         self._wake = [threading.Event() for _ in range(threads - 1)]
         self._is_over = False
         self._helpers = [threading.Thread(target=self._help, args=(k,), daemon=True) for k in range(threads - 1)]
         for helper in self._helpers:
             helper.start()
-        atexit.register(self._end)
+        _crews.add(self)
+        atexit.register(self.end)
 
     def _work_of(self, thread: int) -> wp.Launch:
-        command = wp.Launch(work_at, wp.get_device("cpu"))
+        cpu = wp.get_device("cpu")
+        kernel_cache.load(work_at, cpu)
         job = 0 if thread else ctypes.addressof(self._job)
-        for k, value in enumerate((ctypes.addressof(self._board), job, thread, PATIENCE)):
-            command.set_param_at_index(k, value)
-        command.set_dim(1)
-        return command
+        inputs = [ctypes.addressof(self._board), job, thread, PATIENCE]
+        return wp.launch(work_at, dim=1, inputs=inputs, device=cpu, record_cmd=True)
 
-    def launch(self, command: wp.Launch, first: int, items: int) -> None:
-        """Run a recorded kernel, whose first parameter is the first item's number, for items from ``first`` on."""
-        slices = min(items, SLICES * self._threads)
-        if self._threads == 1 or slices == 1 or not self._is_free.acquire(blocking=False):
-            command.set_param_at_index(0, first)
-            command.set_dim(items)
-            command.launch()
-            return
-        try:
-            self._share(command, first, items, slices)
-        finally:
-            self._is_free.release()
+    def prepared(self, kernel: wp.Kernel, count: int, arguments: Sequence[Any], cpu: wp.Device) -> Run:
+        """``kernel(first, *arguments)``, ready to be run by the threads for some of ``count`` items."""
+        command = recorded(kernel, count, arguments, cpu)
+        call = self._calls.get(kernel)
+        if call is None or not call.is_for(command):
+            call = self._calls[kernel] = warp_abi.NativeCall(command)
+        run_alone = alone(command)
+        # What does not fit on the board, or cannot be called with an item's number, one thread runs.
+        if call.argument_bytes > LARGEST_ARGUMENTS or not call.is_possible:
+            return run_alone
 
-    def _share(self, command: wp.Launch, first: int, items: int, slices: int) -> None:
-        arguments = self._packed(command)
+        def run(first: int, items: int) -> None:
+            slices = min(items, SLICES * self._threads)
+            if slices == 1 or self._is_over or not self._is_free.acquire(blocking=False):
+                run_alone(first, items)
+                return
+            try:
+                self._share(call, call.arguments(command), first, items, slices)
+            finally:
+                self._is_free.release()
+
+        return run
+
+    def _share(
+        self, call: warp_abi.NativeCall, arguments: ctypes.Structure, first: int, items: int, slices: int
+    ) -> None:
         job = self._job
-        job.kernel = ctypes.cast(command.hooks.forward, ctypes.c_void_p).value
-        job.arguments, job.argument_bytes = ctypes.addressof(arguments), ctypes.sizeof(arguments)
+        job.kernel = call.entry_point
+        job.arguments, job.argument_bytes = ctypes.addressof(arguments), call.argument_bytes
         job.first, job.items, job.slices = first, items, slices
         for wake in self._wake:
             wake.set()
@@ -193,19 +242,18 @@ class Crew:
         try:
             self._work[0].launch()
         finally:
-            while self._board.finished.value < slices:
-                time.sleep(LOOK_AGAIN)
+            self._wait_for(slices)
 
-    def _packed(self, command: wp.Launch) -> ctypes.Structure:
-        """The arguments as the kernel's entry point reads them: one after another as in a C structure."""
-        arguments = command.params[1:]
-        if command.kernel not in self._blocks:
-            fields = [(f"argument_{k}", type(argument)) for k, argument in enumerate(arguments)]
-            fields.append(("end", ctypes.c_uint64 * 0))  # a whole number of words
-            self._blocks[command.kernel] = type("Block", (ctypes.Structure,), {"_fields_": fields})
-        block = self._blocks[command.kernel](*arguments)
-        assert ctypes.sizeof(block) <= LARGEST_ARGUMENTS
-        return block
+    def _wait_for(self, slices: int) -> None:
+        """Wait till all slices are finished, however often the user presses Ctrl-C meanwhile."""
+        stopped = None
+        while self._board.finished.value < slices:
+            try:
+                time.sleep(LOOK_AGAIN)
+            except KeyboardInterrupt as error:
+                stopped = error
+        if stopped is not None:
+            raise stopped
 
     def _help(self, helper: int) -> None:
         wake, work = self._wake[helper], self._work[1 + helper]
@@ -214,10 +262,132 @@ class Crew:
             wake.clear()
             work.launch()
 
-    def _end(self) -> None:
-        """Have the helpers leave native code before Warp unloads it."""
+    def end(self) -> None:
+        """Have the helpers leave native code, as they must before Warp unloads it. Later launches have none."""
         self._is_over = True
-        for wake in self._wake:
-            wake.set()
+        with self._is_free:  # a thread that lives on may be launching
+            for wake in self._wake:
+                wake.set()
         for helper in self._helpers:
             helper.join()
+        atexit.unregister(self.end)
+
+
+_crews: weakref.WeakSet[Crew] = weakref.WeakSet()
+
+
+def _after_fork_in_child() -> None:
+    # The helpers do not exist here: nobody can wake them or wait for them.
+    for crew in list(_crews):
+        atexit.unregister(crew.end)
+    _crews.clear()
+    _tried.lock = threading.Lock()
+
+
+os.register_at_fork(after_in_child=_after_fork_in_child)
+
+
+class Pool:
+    """Python threads that launch slices by Warp's public functions: slower than a crew, and the same bits."""
+
+    def __init__(self, threads: int) -> None:
+        self._threads = threads
+        self._pool = ThreadPoolExecutor(threads, thread_name_prefix="ldtrefl")
+
+    def prepared(self, kernel: wp.Kernel, count: int, arguments: Sequence[Any], cpu: wp.Device) -> Run:
+        """As :meth:`Crew.prepared`."""
+        kernel_cache.load(kernel, cpu)
+
+        def run_slice(begin: int, end: int) -> None:
+            inputs = [begin, *arguments]
+            wp.launch(kernel, dim=end - begin, inputs=inputs, device=cpu, record_tape=False)
+
+        def run(first: int, items: int) -> None:
+            slices = min(items, POOL_SLICES * self._threads)
+            bounds = [first + items * k // slices for k in range(slices + 1)]
+            if slices == 1:
+                run_slice(*bounds)
+                return
+            futures: list[Future[None]] = []
+            try:
+                for begin, end in itertools.pairwise(bounds):
+                    futures.append(self._pool.submit(run_slice, begin, end))
+            finally:
+                # What this thread returns from, another may not go on writing to.
+                wait(futures)
+            for future in futures:
+                future.result()
+
+        return run
+
+
+TRIED_ITEMS = 1000
+"""Items of the kernel that is tried: some for each slice of two threads, and not as many for each."""
+
+
+@wp.struct
+class Tried:
+    """An argument with a member of each kind, of different sizes."""
+
+    flag: wp.uint8
+    offset: wp.float64
+    scale: wp.vec3
+    values: wp.array(dtype=float)
+
+
+@wp.kernel(module="unique", enable_backward=False)
+def tried_kernel(first: int, tried: Tried, values_out: wp.array(dtype=float)):
+    i = first + wp.tid()
+    added = tried.scale[0] + tried.scale[1] * tried.scale[2] + float(tried.offset) + float(tried.flag)
+    values_out[i] = values_out[i] + tried.values[i] + added
+
+
+def why_not_native() -> str | None:
+    """Why slices cannot be shared in native code with this Warp; None if they can. Tried once in a process.
+
+    A small kernel is called natively for several ranges of items and compared with Warp's own launch: every item must
+    have been done once, and none beyond.
+    """
+    with _tried.lock:
+        if not _tried.is_known:
+            try:
+                _tried.fault = _try()
+            except Exception as error:
+                _tried.fault = f"{type(error).__name__}: {' '.join(str(error).split())}"
+            _tried.is_known = True
+        return _tried.fault
+
+
+class _Trial:
+    """What has been found out, once in a process."""
+
+    def __init__(self) -> None:
+        self.lock = threading.Lock()
+        self.is_known = False
+        self.fault: str | None = None
+
+
+_tried = _Trial()
+
+
+def _try() -> str | None:
+    tried = Tried()
+    tried.flag, tried.offset, tried.scale = wp.uint8(3), wp.float64(0.5), wp.vec3(1.0, 2.0, 4.0)
+    cpu = wp.get_device("cpu")
+    tried.values = wp.array(np.arange(TRIED_ITEMS, dtype=np.float32), dtype=float, device=cpu)
+    expected, found = (wp.zeros(TRIED_ITEMS, dtype=float, device=cpu) for _ in range(2))
+    command = recorded(tried_kernel, TRIED_ITEMS, [tried, found], cpu)
+    unknown = warp_abi.unknown_layout(command, kernel_cache.folders())
+    if unknown is not None:
+        return unknown
+    crew = Crew(2)
+    try:
+        run = crew.prepared(tried_kernel, TRIED_ITEMS, [tried, found], cpu)
+        for first, items in ((0, TRIED_ITEMS - 1), (1, 2 * SLICES), (TRIED_ITEMS // 2, 5)):
+            run(first, items)
+            inputs = [first, tried, expected]
+            wp.launch(tried_kernel, dim=items, inputs=inputs, device=cpu, record_tape=False)
+    finally:
+        crew.end()
+    same = np.array_equal(expected.numpy(), found.numpy())
+    return None if same else "a kernel that was tried gave other values than Warp's own launch"

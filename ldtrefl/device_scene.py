@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from ldtrefl import warp_abi
 from ldtrefl.errors import InputError
 from ldtrefl.mesh import Mesh
 from ldtrefl.scene import Camera, Light, Object, Scene
@@ -170,7 +171,7 @@ class DeviceScene:
         """Bytes of the normals and texture coordinates on the device."""
         meshes = {id(entry.geometry): entry.geometry for entry in self.objects}.values()
         made = [array for mesh in meshes for name, array in vars(mesh).items() if name in ("normals", "uvs")]
-        return sum(array.size * wp.types.type_size_in_bytes(array.dtype) for array in made)
+        return sum(warp_abi.array_bytes(array) for array in made)
 
     @property
     def device_units_per_world_unit(self) -> float:

@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from ldtrefl import warp_abi
 from ldtrefl.device_scene import DeviceMesh
 from ldtrefl.strays import StrayTriangle
 
@@ -123,9 +124,7 @@ class Grid:
     @functools.cached_property
     def view_without_leaps(self) -> Any:
         """The ``GridView`` in which empty cells are crossed one by one, to measure what the leaps save."""
-        view = GridView()
-        for name in vars(GridView)["vars"]:
-            setattr(view, name, getattr(self.view, name))
+        view = warp_abi.copy_of_struct(self.view, GridView)
         single = np.minimum(self.view.leaps.numpy(), 1)
         view.leaps = wp.array(single, dtype=wp.uint8, device=self.view.leaps.device)
         return view
@@ -134,4 +133,4 @@ class Grid:
     def nbytes(self) -> int:
         """Bytes that the grid takes, the mesh not counted."""
         arrays = (getattr(self.view, name) for name in _DTYPES)
-        return sum(array.size * wp.types.type_size_in_bytes(array.dtype) for array in arrays)
+        return sum(warp_abi.array_bytes(array) for array in arrays)

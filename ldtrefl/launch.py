@@ -8,21 +8,20 @@ slicing, so the bits do not depend on the number of threads.
 
 from __future__ import annotations
 
-import functools
+import operator
 import os
+import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, SupportsIndex
 
 import warp as wp
 
-from ldtrefl.crew import Crew
+from ldtrefl import kernel_cache
+from ldtrefl.crew import Crew, Pool, alone, recorded, why_not_native
 from ldtrefl.errors import InputError
-from ldtrefl.native import caught_stderr
-
-wp.config.log_level = wp.LOG_ERROR
 
 REPORTS = 32
 """Times that a launch reports how far it is, if anyone wants to know."""
@@ -30,8 +29,10 @@ REPORTS = 32
 KERNELS: list[wp.Kernel] = []
 """Every kernel defined so far. Each is a module of its own: it is compiled when it is first needed, and no sooner."""
 
-NO_DRIVER = b"Could not find or load the NVIDIA CUDA driver"
-"""What Warp says at its start on a machine without a GPU."""
+MOST_ITEMS = 2**31 - 1
+"""Items of a launch: their numbers are int32."""
+
+MOST_THREADS = 1024
 
 
 @dataclass
@@ -39,12 +40,28 @@ class _State:
     """What one process shares."""
 
     threads: int = os.cpu_count() or 1
-    crews: dict[int, Crew] = field(default_factory=dict)  # by number of threads
+    crews: dict[int, Crew | Pool] = field(default_factory=dict)  # by number of threads
+    lock: threading.Lock = field(default_factory=threading.Lock)  # to make a crew
+
+
+class _Watch(threading.local):
+    """Who wants to know how far the launches of this thread are."""
+
     observer: Callable[[str, float], None] | None = None
     stage: str = ""
 
 
 _state = _State()
+_watch = _Watch()
+
+
+def _after_fork_in_child() -> None:
+    # Threads do not exist in a forked process: it makes its own at its first launch.
+    _state.crews.clear()
+    _state.lock = threading.Lock()
+
+
+os.register_at_fork(after_in_child=_after_fork_in_child)
 
 
 def kernel(function: Callable[..., None]) -> wp.Kernel:
@@ -54,17 +71,19 @@ def kernel(function: Callable[..., None]) -> wp.Kernel:
     return made
 
 
-def set_threads(threads: int | None = None) -> None:
+def set_threads(threads: SupportsIndex | None = None) -> None:
     """Use this many CPU threads from now on; ``None`` means all cores.
 
     Raises:
-        InputError: ``threads`` is not a whole number of at least 1.
+        InputError: ``threads`` is not a whole number from 1 to 1024.
     """
-    if threads is None:
-        threads = os.cpu_count() or 1
-    if not isinstance(threads, int) or isinstance(threads, bool) or not 1 <= threads <= 1024:
-        raise InputError(f"threads must be a whole number from 1 to 1024, got {threads!r}")
-    _state.threads = threads
+    try:
+        number = (os.cpu_count() or 1) if threads is None else operator.index(threads)
+    except TypeError:
+        number = 0
+    if isinstance(threads, bool) or not 1 <= number <= MOST_THREADS:
+        raise InputError(f"threads must be a whole number from 1 to {MOST_THREADS}, got {threads!r}")
+    _state.threads = number
 
 
 def thread_count() -> int:
@@ -72,25 +91,24 @@ def thread_count() -> int:
     return _state.threads
 
 
-@functools.cache
-def _start_warp() -> None:
-    """Initialise Warp. Its native code warns of a missing CUDA driver on standard error, which is no news here."""
-    with caught_stderr() as caught:
-        wp.init()
-        caught.seek(0)
-        said = caught.read()
-    for line in said.splitlines(keepends=True):
-        if NO_DRIVER not in line:
-            os.write(2, line)
+def threading_note() -> str | None:
+    """A line if threads share launches in a slower way, because this version of Warp is not known well enough."""
+    resolve_device(None)
+    reason = why_not_native()
+    if reason is None:
+        return None
+    return (
+        f"threads: launches are shared out in Python, which is slower, as Warp {wp.__version__} is not known: {reason}"
+    )
 
 
 def resolve_device(name: str | None) -> wp.Device:
     """The device called ``name`` ('cpu', 'cuda:0'); ``None`` means the CPU.
 
     Raises:
-        InputError: there is no such device here.
+        InputError: there is no such device here, or no folder that compiled kernels can be written to.
     """
-    _start_warp()
+    kernel_cache.start_warp()
     try:
         return wp.get_device(name or "cpu")
     except Exception as error:
@@ -100,26 +118,36 @@ def resolve_device(name: str | None) -> wp.Device:
 
 @contextmanager
 def progress_to(observer: Callable[[str, float], None]) -> Iterator[None]:
-    """Report every finished part of a launch to ``observer(stage, fraction of the launch)`` inside this block."""
-    before, _state.observer = _state.observer, observer
+    """Report the launches of this thread to ``observer(stage, fraction of the launch)`` inside this block."""
+    before, _watch.observer = _watch.observer, observer
     try:
         yield
     finally:
-        _state.observer = before
+        _watch.observer = before
 
 
 def launch(kernel: wp.Kernel, count: int, arguments: Sequence[Any], device: wp.Device) -> None:
-    """Run ``kernel(first, *arguments)`` for ``count`` items, on the CPU in slices over the threads."""
+    """Run ``kernel(first, *arguments)`` for ``count`` items, on the CPU in slices over the threads.
+
+    Raises:
+        InputError: there are more items than int32 can number, or the kernel must be compiled and no folder can be
+            written.
+    """
     if count <= 0:
         return
+    _check_count(count)
     if not device.is_cpu:
+        kernel_cache.load(kernel, device)
         wp.launch(kernel, dim=count, inputs=[0, *arguments], device=device)
         return
-    command = wp.launch(kernel, dim=count, inputs=[0, *arguments], device=device, record_cmd=True)
-    reports = 1 if _state.observer is None else min(count, REPORTS)
+    if _state.threads == 1:
+        run = alone(recorded(kernel, count, arguments, device))
+    else:
+        run = _crew().prepared(kernel, count, arguments, device)
+    reports = 1 if _watch.observer is None else min(count, REPORTS)
     for k in range(reports):
         first, end = (count * part // reports for part in (k, k + 1))
-        _crew().launch(command, first, end - first)
+        run(first, end - first)
         _report(end / count)
 
 
@@ -127,21 +155,36 @@ def launch_in_order(kernel: wp.Kernel, count: int, arguments: Sequence[Any], dev
     """Run ``kernel(first, *arguments)`` for ``count`` items, on the CPU one after another on one thread.
 
     For kernels whose items share memory. CUDA runs them at once, so such kernels use atomics all the same (Warp's
-    atomics are plain additions on the CPU).
+    atomics are plain additions on the CPU). Raises as :func:`launch` does.
     """
     if count > 0:
+        _check_count(count)
+        kernel_cache.load(kernel, device)
         wp.launch(kernel, dim=count, inputs=[0, *arguments], device=device)
 
 
-def _crew() -> Crew:
-    if _state.threads not in _state.crews:
-        _state.crews[_state.threads] = Crew(_state.threads)
-    return _state.crews[_state.threads]
+def _check_count(count: int) -> None:
+    if count > MOST_ITEMS:
+        raise InputError(
+            f"{count} items at once, at most {MOST_ITEMS} can be numbered: take a smaller scene or resolution"
+        )
+
+
+def _crew() -> Crew | Pool:
+    threads = _state.threads
+    crew = _state.crews.get(threads)
+    if crew is None:
+        with _state.lock:
+            crew = _state.crews.get(threads)
+            if crew is None:
+                crew = Pool(threads) if why_not_native() else Crew(threads)
+                _state.crews[threads] = crew
+    return crew
 
 
 def _report(fraction: float) -> None:
-    if _state.observer is not None:
-        _state.observer(_state.stage, fraction)
+    if _watch.observer is not None:
+        _watch.observer(_watch.stage, fraction)
 
 
 @dataclass
@@ -154,7 +197,7 @@ class Stats:
     @contextmanager
     def stage(self, name: str, device: wp.Device) -> Iterator[None]:
         """Add the time of this block to ``seconds[name]``, the device's work included."""
-        outer, _state.stage = _state.stage, name
+        outer, _watch.stage = _watch.stage, name
         _report(0.0)
         start = time.perf_counter()
         try:
@@ -163,7 +206,7 @@ class Stats:
                 wp.synchronize_device(device)
         finally:
             self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
-            _state.stage = outer
+            _watch.stage = outer
 
     def count(self, name: str, amount: int) -> None:
         """Add ``amount`` to ``counters[name]``."""

@@ -1,24 +1,135 @@
-"""What native libraries print behind Python's back."""
+"""Standard error: what native libraries print there behind Python's back, and the lines that the package logs."""
 
 from __future__ import annotations
 
+import logging
 import os
+import re
 import sys
 import tempfile
+import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
-from typing import BinaryIO
+from contextlib import contextmanager, suppress
+
+CHATTER = re.compile(
+    b"(?:"
+    b"libpng (?:error|warning):"  # of a damaged PNG, which is refused in a line of our own
+    b"|Failed to add object file:"  # LLVM, of a damaged kernel cache: likewise
+    b"|Warp CUDA warning: Could not find or load the NVIDIA CUDA driver"  # no news on a machine without a GPU
+    b")[^\n]*\n?"
+)
+"""What native libraries print and nobody needs to see: to the end of its line, as another thread's line may have been
+begun before it."""
+
+STDERR = 2
+
+
+class _Catching:
+    """File descriptor 2 is the whole process's: however many threads catch, it is put aside once."""
+
+    def __init__(self) -> None:
+        self.lock = threading.Lock()
+        self.blocks = 0  # threads' blocks that are open
+        self.kept = -1  # a duplicate of what descriptor 2 was; -1 if nothing is caught
+        self.said = -1  # the file that it is meanwhile
+
+    def begin(self) -> None:
+        self.blocks += 1
+        if self.blocks > 1:
+            return
+        opened: list[int] = []
+        try:
+            opened.append(os.dup(STDERR))
+            opened.append(_scratch_file())
+            os.dup2(opened[1], STDERR)
+        except OSError:
+            # Standard error is closed, or there is no room for a file: nothing is caught, nothing is changed.
+            for descriptor in opened:
+                os.close(descriptor)
+            return
+        self.kept, self.said = opened
+
+    def end(self) -> None:
+        self.blocks -= 1
+        if self.blocks or self.kept < 0:
+            return
+        os.dup2(self.kept, STDERR)
+        size = os.lseek(self.said, 0, os.SEEK_END)
+        os.lseek(self.said, 0, os.SEEK_SET)
+        with open(self.said, "rb") as said:
+            caught = said.read(size)
+        os.close(self.kept)
+        self.kept = self.said = -1
+        # What else was printed meanwhile, by other threads, belongs where it was meant to go.
+        rest = CHATTER.sub(b"", caught)
+        with suppress(OSError):
+            while rest:
+                rest = rest[os.write(STDERR, rest) :]
+
+    def after_fork_in_child(self) -> None:
+        """The threads that were in a block do not exist here, and the parent prints what they caught."""
+        if self.kept >= 0:
+            os.dup2(self.kept, STDERR)
+            os.close(self.kept)
+            os.close(self.said)
+        self.blocks, self.kept, self.said = 0, -1, -1
+        self.lock.release()
+
+
+_catching = _Catching()
+# No thread is half way through a swap while another forks.
+os.register_at_fork(
+    before=_catching.lock.acquire,
+    after_in_parent=_catching.lock.release,
+    after_in_child=_catching.after_fork_in_child,
+)
 
 
 @contextmanager
-def caught_stderr() -> Iterator[BinaryIO]:
-    """Catch what native libraries print on standard error inside this block: a file, to be read after it."""
-    with tempfile.TemporaryFile() as said:
-        sys.stderr.flush()
-        kept = os.dup(2)
-        try:
-            os.dup2(said.fileno(), 2)
-            yield said
-        finally:
-            os.dup2(kept, 2)
-            os.close(kept)
+def caught_stderr() -> Iterator[None]:
+    """Drop the ``CHATTER`` that native libraries print on standard error inside this block.
+
+    Any number of threads may be inside at once, and blocks may stand in one another. All else that is printed
+    meanwhile, by whichever thread, is printed when the last block ends. Nothing is caught where standard error is
+    closed.
+    """
+    with _catching.lock:
+        _catching.begin()
+    try:
+        yield
+    finally:
+        with _catching.lock:
+            _catching.end()
+
+
+def _scratch_file() -> int:
+    if hasattr(os, "memfd_create"):
+        return os.memfd_create("ldtrefl-stderr")
+    with tempfile.TemporaryFile() as file:
+        return os.dup(file.fileno())
+
+
+class _StderrHandler(logging.Handler):
+    """Writes to what standard error is now, so that a progress bar that has taken it over stays whole."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        with suppress(AttributeError, OSError, ValueError):
+            sys.stderr.write(f"ldtrefl: {record.getMessage()}\n")
+            sys.stderr.flush()
+
+
+@contextmanager
+def log_on_stderr() -> Iterator[None]:
+    """Print what the package logs, notices included, inside this block: for the command line.
+
+    Without it a program sees notices only if it sets logging up for ``logging.getLogger("ldtrefl")``.
+    """
+    log, handler = logging.getLogger("ldtrefl"), _StderrHandler()
+    level = log.level
+    log.addHandler(handler)
+    log.setLevel(logging.INFO)
+    try:
+        yield
+    finally:
+        log.removeHandler(handler)
+        log.setLevel(level)

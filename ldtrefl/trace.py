@@ -7,7 +7,6 @@ above it (bounces, shadows, shading, counters) exists once for the layered depth
 A tracer works in the object's unit space, with unit directions. A miss is ``t = +inf`` and triangle -1.
 """
 
-import ctypes
 import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,7 +15,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from ldtrefl import launch
+from ldtrefl import launch, warp_abi
 from ldtrefl.device_scene import DeviceMesh
 from ldtrefl.errors import InputError
 from ldtrefl.shade import ONE_THIRD
@@ -90,13 +89,8 @@ class Hits:
 
 
 def array_of_views(views: Sequence[Any], view: Any, device: wp.Device) -> wp.array:
-    """Views of objects as an array that kernels read: copied bit by bit, a fifth of the time that ``wp.array`` takes to
-    find out what a struct is made of. Whoever keeps the array keeps the views, too: they own what it points to."""
-    size = wp.types.type_size_in_bytes(view)
-    made = wp.empty(len(views), dtype=view, device="cpu")
-    for k, one in enumerate(views):
-        ctypes.memmove(made.ptr + k * size, ctypes.addressof(one.__ctype__()), size)
-    return made.to(device)
+    """Views of objects as an array that kernels read. Whoever keeps the array keeps the views, too."""
+    return warp_abi.array_of_structs(views, view, device)
 
 
 @functools.cache

@@ -201,7 +201,7 @@ def test_command_line_does_its_work(scene_file: Path) -> None:
     ]:
         done = run(*arguments, folder=folder)
         assert done.returncode == 0 and said in done.stdout, (arguments, done.stdout, done.stderr)
-        assert done.stderr == ""
+        assert not [line for line in done.stderr.splitlines() if not line.startswith("ldtrefl: compiling kernels")]
     assert ldtrefl.load_image(folder / "scene.png").shape == (16, 24, 3)
     made = {path.name for path in (folder / "cmp").iterdir()}
     pictures = {f"{name}{kind}.png" for name in ("ldt", "envmap") for kind in ("", "-difference")} | {"bvh.png"}

@@ -1,0 +1,151 @@
+"""All that is private to Warp, in one place.
+
+Warp promises nothing about what stands here, and it may differ in its next version. So everything is guarded:
+``unknown_layout`` says, before any native code is called, what is not as it was in the versions that this was written
+for (1.18 and 1.19 agree); ``crew.py`` then tries a small kernel and compares, and launches by Warp's public functions
+if anything is amiss. The other functions have a slower public way, or an answer that means "not known".
+"""
+
+from __future__ import annotations
+
+import ctypes
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import warp as wp
+
+BOUNDS_FIELDS = (("shape", ctypes.c_uint32 * 1), ("size", ctypes.c_size_t), ("coord_mult", ctypes.c_size_t))
+"""Warp's ``launch_bounds_t`` of a kernel of one dimension, as ``CALL_KERNEL`` fills it."""
+
+ENTRY_POINT = re.compile(
+    r"WP_API void \w+_cpu_forward\(\s*wp::launch_bounds_t<1> ?\* ?\w+,\s*wp_args_\w+ ?\* ?\w+\s*\)"
+)
+"""A kernel's entry point in the C++ that Warp writes: bounds, and a structure of arguments, both by address."""
+
+CALL_KERNEL = """
+    struct Warp {
+        // Run a kernel of one dimension for items 0 to items - 1; wp.tid() is the item.
+        static void call_kernel(uint64_t entry_point, uint64_t items, void* arguments) {
+            wp::launch_bounds_t<1> bounds = {};
+            bounds.shape[0] = (uint32_t)items;
+            bounds.size = items;
+            bounds.coord_mult = 1;
+            ((void (*)(wp::launch_bounds_t<1>*, void*))entry_point)(&bounds, arguments);
+        }
+    };
+"""
+"""C++ for the body of a ``wp.func_native``."""
+
+
+def unknown_layout(command: wp.Launch, folders: Sequence[Path]) -> str | None:
+    """What is unknown of how a recorded CPU launch is called; None if all is as it should be. Calls no native code.
+
+    ``folders`` are the kernel caches in which the C++ of the kernel may lie.
+    """
+    try:
+        bounds, *arguments = command.params
+        fields = tuple((name, type_) for name, type_ in type(bounds)._fields_)
+        if fields != BOUNDS_FIELDS:
+            return f"launch bounds are {', '.join(name for name, _ in fields)}"
+        if len(arguments) != len(command.kernel.adj.args):
+            return f"{len(arguments)} values for {len(command.kernel.adj.args)} parameters"
+        if not callable_natively(command):
+            return "a kernel has no entry point, or its block several threads, or an int is no int32"
+        if not ENTRY_POINT.search(_generated_source(command, folders)):
+            return "a kernel's entry point takes other arguments"
+    except Exception as error:
+        return f"{type(error).__name__}: {error}"
+    return None
+
+
+def entry_point(command: wp.Launch) -> int:
+    """The address of a recorded CPU kernel's code."""
+    return ctypes.cast(command.hooks.forward, ctypes.c_void_p).value or 0
+
+
+def callable_natively(command: wp.Launch) -> bool:
+    """Whether ``CALL_KERNEL`` may call this kernel, with an item's number written over its first argument."""
+    return (
+        command.block_dim == 1
+        and type(command.params[0])._fields_ == BOUNDS_FIELDS
+        and type(command.params[1]) is ctypes.c_int32
+        and entry_point(command) != 0
+    )
+
+
+class NativeCall:
+    """How ``CALL_KERNEL`` calls a kernel, for every recorded launch of it."""
+
+    def __init__(self, command: wp.Launch) -> None:
+        # The entry point reads the arguments one after another as in a C structure; we copy whole words of it.
+        fields: list[tuple[str, Any]] = [(f"argument_{k}", type(value)) for k, value in enumerate(command.params[1:])]
+        fields.append(("end", ctypes.c_uint64 * 0))
+        self._type = type("Arguments", (ctypes.Structure,), {"_fields_": fields})
+        self._hooks = command.hooks
+        self.is_possible = callable_natively(command)
+        self.entry_point = entry_point(command)
+        self.argument_bytes = ctypes.sizeof(self._type)
+
+    def is_for(self, command: wp.Launch) -> bool:
+        """Whether this launch is of the same code: Warp may have loaded the kernel anew."""
+        return command.hooks is self._hooks
+
+    def arguments(self, command: wp.Launch) -> ctypes.Structure:
+        """The arguments of a recorded launch."""
+        return self._type(*command.params[1:])
+
+
+def _generated_source(command: wp.Launch, folders: Sequence[Path]) -> str:
+    """The C++ that Warp wrote for a kernel and keeps beside the object file."""
+    name = command.kernel.module.get_module_identifier(block_dim=command.block_dim)
+    paths = [folder / name / f"{name}.cpp" for folder in folders]
+    return next((path for path in paths if path.exists()), paths[0]).read_text()
+
+
+def is_compiled(kernel: wp.Kernel, device: wp.Device) -> bool | None:
+    """Whether Warp's kernel cache holds this kernel; None if that cannot be known."""
+    try:
+        module = kernel.module
+        block_dim = 1 if device.is_cpu else module.options["block_dim"]
+        folder = Path(wp.config.kernel_cache_dir) / module.get_module_identifier(block_dim=block_dim)
+        made = module._get_compile_output_name(device, block_dim=block_dim)
+        described = module._get_meta_name(block_dim=block_dim)
+        return bool(wp.config.cache_kernels) and (folder / made).exists() and (folder / described).exists()
+    except Exception:
+        return None
+
+
+def forget_failure(kernel: wp.Kernel) -> None:
+    """Let Warp try again to build a kernel that it could not build."""
+    wp.set_module_options({}, module=kernel.module)
+
+
+def array_of_structs(structs: Sequence[Any], dtype: Any, device: wp.Device) -> wp.array:
+    """Structs as an array that kernels read: copied bit by bit, a fifth of the time that ``wp.array`` takes to find out
+    what a struct is made of. Whoever keeps the array keeps the structs, too: they own what it points to."""
+    try:
+        contents = [bytes(one.__ctype__()) for one in structs]
+        size = int(dtype.numpy_dtype()["itemsize"])
+    except (AttributeError, KeyError, TypeError):
+        return wp.array(list(structs), dtype=dtype, device=device)
+    if any(len(one) != size for one in contents):
+        return wp.array(list(structs), dtype=dtype, device=device)
+    made = wp.empty(len(contents), dtype=dtype, device="cpu")
+    if contents:
+        ctypes.memmove(made.ptr, b"".join(contents), size * len(contents))
+    return made.to(device)
+
+
+def copy_of_struct(struct: Any, dtype: Any) -> Any:
+    """Another struct with the same fields; arrays are shared."""
+    made = dtype()
+    for name in dtype.numpy_dtype()["names"]:
+        setattr(made, name, getattr(struct, name))
+    return made
+
+
+def array_bytes(array: wp.array) -> int:
+    """Bytes that the elements of an array take."""
+    return array.size * wp.types.type_size_in_bytes(array.dtype)
