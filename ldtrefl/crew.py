@@ -9,32 +9,28 @@ Each thread has its own run of a job's slices, the same in every launch, and tak
 kernel wrote, the next then mostly reads in the same core's cache.
 
 That calls kernels as Warp does (``warp_abi.py``). Before the first such call ``why_not_native`` tries it; where it does
-not work, a ``Pool`` of Python threads launches the slices by Warp's public functions.
+not work, Python threads launch the slices by Warp's public functions (``python_pool.py``).
 """
 
 from __future__ import annotations
 
 import atexit
 import ctypes
-import itertools
 import os
 import threading
 import time
 import weakref
-from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor, wait
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import warp as wp
 
 from ldtrefl import kernel_cache, warp_abi
+from ldtrefl.python_pool import Run
 
 SLICES = 64
 """Slices of a job for each thread. To take one costs 50 nanoseconds; the last ones make others wait."""
-
-POOL_SLICES = 4
-"""The same for a pool of Python threads, to whom a slice costs 100 microseconds."""
 
 PATIENCE = 5_000
 """Looks at a board with nothing to do before a thread sleeps: some 200 microseconds, longer than what Python does
@@ -157,10 +153,6 @@ def work_at(board_address: wp.uint64, job_address: wp.uint64, thread: wp.uint64,
     work(board_address, job_address, thread, patience)
 
 
-Run = Callable[[int, int], None]
-"""A kernel that is ready to be run for some items: the first one's number, and how many."""
-
-
 def recorded(kernel: wp.Kernel, count: int, arguments: Sequence[Any], cpu: wp.Device) -> wp.Launch:
     """A launch of ``kernel(first, *arguments)`` on the CPU that has not been made yet."""
     kernel_cache.load(kernel, cpu)
@@ -192,9 +184,14 @@ class Crew:
         self._work = [self._work_of(thread) for thread in range(threads)]
         self._wake = [threading.Event() for _ in range(threads - 1)]
         self._is_over = False
-        self._helpers = [threading.Thread(target=self._help, args=(k,), daemon=True) for k in range(threads - 1)]
-        for helper in self._helpers:
-            helper.start()
+        self._helpers: list[threading.Thread] = []
+        for k in range(threads - 1):
+            helper = threading.Thread(target=self._help, args=(k,), daemon=True)
+            try:
+                helper.start()
+            except RuntimeError:
+                break  # The system gives no more threads: the others take the slices of those that are missing.
+            self._helpers.append(helper)
         _crews.add(self)
         atexit.register(self.end)
 
@@ -285,40 +282,6 @@ def _after_fork_in_child() -> None:
 
 
 os.register_at_fork(after_in_child=_after_fork_in_child)
-
-
-class Pool:
-    """Python threads that launch slices by Warp's public functions: slower than a crew, and the same bits."""
-
-    def __init__(self, threads: int) -> None:
-        self._threads = threads
-        self._pool = ThreadPoolExecutor(threads, thread_name_prefix="ldtrefl")
-
-    def prepared(self, kernel: wp.Kernel, count: int, arguments: Sequence[Any], cpu: wp.Device) -> Run:
-        """As :meth:`Crew.prepared`."""
-        kernel_cache.load(kernel, cpu)
-
-        def run_slice(begin: int, end: int) -> None:
-            inputs = [begin, *arguments]
-            wp.launch(kernel, dim=end - begin, inputs=inputs, device=cpu, record_tape=False)
-
-        def run(first: int, items: int) -> None:
-            slices = min(items, POOL_SLICES * self._threads)
-            bounds = [first + items * k // slices for k in range(slices + 1)]
-            if slices == 1:
-                run_slice(*bounds)
-                return
-            futures: list[Future[None]] = []
-            try:
-                for begin, end in itertools.pairwise(bounds):
-                    futures.append(self._pool.submit(run_slice, begin, end))
-            finally:
-                # What this thread returns from, another may not go on writing to.
-                wait(futures)
-            for future in futures:
-                future.result()
-
-        return run
 
 
 TRIED_ITEMS = 1000

@@ -20,8 +20,9 @@ from typing import Any, SupportsIndex
 import warp as wp
 
 from ldtrefl import kernel_cache
-from ldtrefl.crew import Crew, Pool, alone, recorded, why_not_native
+from ldtrefl.crew import Crew, alone, recorded, why_not_native
 from ldtrefl.errors import InputError
+from ldtrefl.python_pool import Pool
 
 REPORTS = 32
 """Times that a launch reports how far it is, if anyone wants to know."""

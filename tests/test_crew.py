@@ -16,7 +16,7 @@ import pytest
 import warp as wp
 
 import ldtrefl
-from ldtrefl import crew, kernel_cache, launch, warp_abi
+from ldtrefl import crew, kernel_cache, launch, python_pool, warp_abi
 from ldtrefl.cli import main
 
 from .conftest import SMALL_SCENE
@@ -117,7 +117,7 @@ def test_every_item_once_with_an_unknown_warp(unknown_warp: None, count: int) ->
     for threads in (2, 3):
         ldtrefl.set_threads(threads)
         assert_all_launched(count, 5)
-        assert isinstance(launch._state.crews[threads], crew.Pool)
+        assert isinstance(launch._state.crews[threads], python_pool.Pool)
 
 
 def test_several_threads_with_an_unknown_warp(unknown_warp: None) -> None:
@@ -135,7 +135,7 @@ def test_an_unknown_warp_gives_the_same_bits(
     alone = ldtrefl.render(scene)
     ldtrefl.set_threads(2)
     pooled = ldtrefl.render(scene)
-    assert isinstance(launch._state.crews[2], crew.Pool)
+    assert isinstance(launch._state.crews[2], python_pool.Pool)
     assert alone.reflector_mask.any() and alone.image.tobytes() == pooled.image.tobytes()
     assert main(["info", str(path)]) == 0
     said = [line for line in capfd.readouterr().out.splitlines() if "threads: " in line]
@@ -144,7 +144,7 @@ def test_an_unknown_warp_gives_the_same_bits(
 
 def test_what_a_pool_raises_is_raised(unknown_warp: None) -> None:
     launch.resolve_device(None)
-    pool = crew.Pool(2)
+    pool = python_pool.Pool(2)
     run = pool.prepared(add_number, 100, ["not an array"], wp.get_device("cpu"))
     with pytest.raises(Exception, match="array"):
         run(0, 100)
@@ -269,6 +269,27 @@ def test_one_crew_for_all_who_launch_first(fresh_crews: None, monkeypatch: pytes
         caller.join()
     assert len(made) == 1
     made[0].end()
+
+
+@pytest.mark.parametrize("given", [0, 1])
+@pytest.mark.parametrize("kind", [crew.Crew, python_pool.Pool])
+def test_a_system_that_gives_no_more_threads(
+    kind: type[crew.Crew] | type[python_pool.Pool], given: int, fresh_crews: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    launch.resolve_device(None)
+    start, started = threading.Thread.start, []
+
+    def start_some(thread: threading.Thread) -> None:
+        if len(started) == given:
+            raise RuntimeError("can't start new thread")
+        started.append(thread)
+        start(thread)
+
+    monkeypatch.setattr(threading.Thread, "start", start_some)
+    ldtrefl.set_threads(4)
+    launch._state.crews[4] = kind(4)
+    assert_all_launched(10_000, 5)
+    assert len(started) == given
 
 
 def test_stopping_waits_for_the_helpers(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,6 +1,7 @@
 """Imports go one way: a module imports only what stands before it here, and no method imports another."""
 
 import ast
+import re
 from pathlib import Path
 
 import pytest
@@ -18,6 +19,7 @@ BOTTOM_TO_TOP = (
     "cache",
     "warp_abi",
     "kernel_cache",
+    "python_pool",
     "crew",
     "launch",
     "image",
@@ -101,8 +103,18 @@ def test_imports_go_down(module: str) -> None:
 
 
 def test_only_launch_launches() -> None:
-    offenders = [m for m in MODULES if m not in ("crew", "launch") and "wp.launch(" in path_of(m).read_text()]
+    offenders = [
+        m for m in MODULES if m not in ("python_pool", "crew", "launch") and "wp.launch(" in path_of(m).read_text()
+    ]
     assert not offenders
+
+
+def test_only_warp_abi_knows_what_is_private_to_warp() -> None:
+    private = re.compile(
+        r"warp\._src|wp\.Launch\(|\.(hooks|adj|module_exec|__ctype__|_?ctype)\b|command\.params|\"vars\""
+    )
+    found = {m: private.findall(path_of(m).read_text()) for m in MODULES if m != "warp_abi"}
+    assert not any(found.values()), {module: names for module, names in found.items() if names}
 
 
 def test_methods_are_found_by_scanning() -> None:
