@@ -19,6 +19,9 @@ SMALLEST_NORMAL = wp.constant(1.0e-12)
 SMALLEST_SQUARE = wp.constant(1.0e-36)
 """Squared distance of a light that float32 can divide by: a light in the surface itself divides by no 0."""
 
+LARGEST_RADIANCE = wp.constant(1.0e30)
+"""What is brighter is shown as this: sums and products of such stay finite, and no pixel becomes infinite times 0."""
+
 SMALLEST_SINE = wp.constant(1.0e-6)
 """Squared sine of a triangle's corner below which nothing is extended beyond it."""
 
@@ -41,6 +44,12 @@ class Surface:
     albedo: wp.vec3  # times the texture
     emission: wp.vec3
     mirror: wp.vec3  # specular reflectance in this direction, Fresnel included
+
+
+@wp.func
+def at_most_largest(radiance: wp.vec3) -> wp.vec3:
+    """A radiance that can be added and multiplied."""
+    return wp.min(radiance, wp.vec3(LARGEST_RADIANCE))
 
 
 @wp.func
@@ -231,11 +240,11 @@ def make_direct_radiance(is_lit: Any) -> Any:
                 offset = from_to(surface.position, lighting.lights[i].position)
                 distance = wp.length(offset)
                 towards = wp.normalize(offset)
-                radiance = radiance / wp.max(distance * distance, SMALLEST_SQUARE)
+                radiance = at_most_largest(radiance / wp.max(distance * distance, SMALLEST_SQUARE))
             cosine = wp.dot(surface.normal, towards)
             if cosine > 0.0:
                 if is_lit(views, objects, surface, towards, distance):
                     total += cosine * radiance
-        return surface.emission + wp.cw_mul(surface.albedo, total)
+        return at_most_largest(surface.emission + wp.cw_mul(surface.albedo, total))
 
     return direct_radiance

@@ -122,3 +122,16 @@ def test_a_light_in_a_surface_gives_finite_pictures() -> None:
         light = Light(kind="point", position=(0, 0, height), intensity=(1, 1, 1))
         scene = Scene(camera=camera, lights=(light,), lighting=Lighting(shadows=True), objects=(Object(shape="plane"),))
         assert np.isfinite(ldtrefl.render(scene, "ldt").image).all()
+
+
+def test_the_brightest_scene_that_is_allowed_is_finite() -> None:
+    """Albedo, light and emission of 1e15, many lights within 1e-15 of a black floor, of a white one and of a mirror."""
+    camera = Camera(eye=(0, 0, 3), look_at=(0, 0, 0), up=(0, 1, 0), width=9, height=9)
+    light = Light(kind="point", position=(0, 0, 1e-15), intensity=(1e15,) * 3)
+    for albedo, mirror in ((0.0, 0.0), (1e15, 0.0), (0.0, 1.0), (1e15, 1.0)):
+        material = Material(albedo=(albedo,) * 3, mirror=(mirror,) * 3, emission=(1e15,) * 3)
+        floor = Object(shape="plane", material=material)
+        above = Object(shape="plane", translate=(0, 0, 4), material=material)
+        scene = Scene(camera=camera, lights=(light,) * 64, objects=(floor, above))
+        for method in ("ldt", "bvh", "envmap"):
+            assert np.isfinite(ldtrefl.render(scene, method).image).all()
