@@ -4,17 +4,23 @@ A file is written beside its place and moved there, so that it is whole or absen
 begins with its length and a hash of all that follows; one that does not fit is made anew, with a line of warning. It is
 mapped into memory, not copied. When the folder grows beyond its limit, the files not used for longest are removed.
 
+What hashes right is not trusted for that: whoever reads a file checks all of it that indexes memory. The folder and its
+files are the user's alone, whether it is the usual folder or one that was asked for: one that belongs to somebody else,
+or that others may write into, is refused, and such a file is ignored with a warning. A folder that is missing is made
+so, and the usual one is made so if it was not.
+
 A *library* keeps nothing on disk unless :func:`keep_maps_in` is called; the command line does so.
 """
 
 from __future__ import annotations
 
+import contextlib
 import json
 import logging
 import mmap
 import os
 import struct
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,7 +30,7 @@ import platformdirs
 import xxhash
 
 from ldtrefl.errors import InputError
-from ldtrefl.files import writable_folder, written_whole
+from ldtrefl.files import changed_by_others, open_plain, private_folder, written_whole
 
 FORMAT = 2
 """Goes up when what files hold changes: old ones are then not found."""
@@ -67,30 +73,52 @@ class MapCache:
         """Use a folder; the user's cache folder if none is given.
 
         Raises:
-            InputError: it cannot be made or written.
+            InputError: it cannot be made or written, it is another user's, or others may write into it.
         """
-        chosen = Path(platformdirs.user_cache_dir("ldtrefl", False)) if folder is None else Path(folder)
-        self.folder = writable_folder(chosen, make=True)
+        self.folder = private_folder(_usual_folder() if folder is None else Path(folder))
         self.limit = limit
 
     def path(self, key: str) -> Path:
         """Where the file of this name is, or would be."""
         return self.folder / f"{key}{SUFFIX}"
 
-    def load(self, key: str) -> Entry | None:
-        """What is kept under this name; None if there is nothing, or nothing that can be trusted."""
+    def load(self, key: str, read: Callable[[Entry], Any] = lambda entry: entry) -> Any:
+        """What is kept under this name, as ``read`` makes it; None if there is nothing, or nothing that can be trusted.
+
+        ``read`` raises an exception where a file's contents are not sound.
+        """
         path = self.path(key)
         try:
-            with path.open("rb") as file:
-                whole = memoryview(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ))
-            entry = _parsed(whole)
-            os.utime(path)  # used just now
+            return read(_parsed(self._mapped(path)))
         except FileNotFoundError:
             return None
-        except (OSError, ValueError, KeyError, TypeError, struct.error) as error:
-            _log.warning("%s: damaged (%s), made anew", path, error)
+        except Exception as error:  # whatever a damaged file provokes is the file's fault
+            words = " ".join(str(error).split()) or type(error).__name__
+            _log.warning("%s: not to be trusted (%s), made anew", path, words)
             return None
-        return entry
+
+    def _mapped(self, path: Path) -> memoryview:
+        """A file's bytes, mapped into memory.
+
+        Raises:
+            OSError, ValueError: it cannot be read, or is not a plain file of this user's alone.
+        """
+        if path.is_symlink():
+            raise ValueError("a link")
+        descriptor = open_plain(path, follow=False)
+        try:
+            status = os.fstat(descriptor)
+            fault = changed_by_others(status)
+            if fault:
+                raise ValueError(fault)
+            if status.st_size > self.limit:
+                raise ValueError(f"{status.st_size} bytes, at most {self.limit} are kept")
+            whole = memoryview(mmap.mmap(descriptor, 0, access=mmap.ACCESS_READ))
+            with contextlib.suppress(OSError):
+                os.utime(path)  # used just now
+        finally:
+            os.close(descriptor)
+        return whole
 
     def store(self, key: str, arrays: dict[str, np.ndarray], values: dict[str, Any]) -> None:
         """Keep arrays and values under this name. A full disk is no fault: then nothing is kept."""
@@ -102,7 +130,7 @@ class MapCache:
         text += b" " * (-(HEADER.size + len(text)) % ALIGNMENT)
         digest = xxhash.xxh3_64(text)
         try:
-            with written_whole(self.path(key)) as scratch, scratch.open("wb") as file:
+            with written_whole(self.path(key), private=True) as scratch, scratch.open("wb") as file:
                 file.write(HEADER.pack(MAGIC, 0, 0, 0))
                 file.write(text)
                 for array in arrays.values():
@@ -122,7 +150,7 @@ class MapCache:
         found = []
         for path in self.folder.glob(f"*{SUFFIX}"):
             try:
-                stat = path.stat()
+                stat = path.lstat()
             except FileNotFoundError:  # another process has removed it
                 continue
             found.append((path, stat.st_size, stat.st_mtime))
@@ -135,23 +163,34 @@ class MapCache:
         for path, size, _ in files:
             if total <= self.limit:
                 break
-            path.unlink(missing_ok=True)
+            _removed(path)
             total -= size
 
     def clear(self) -> int:
         """Remove all files; how many there were."""
-        files = self.files()
-        for path, _, _ in files:
-            path.unlink(missing_ok=True)
-        return len(files)
+        return sum(_removed(path) for path, _, _ in self.files())
+
+
+def _usual_folder() -> Path:
+    """The user's cache folder. One of an earlier version, which others could enter, is closed to them."""
+    folder = Path(platformdirs.user_cache_dir("ldtrefl", False))
+    with contextlib.suppress(OSError):
+        folder.chmod(0o700)  # fails where it is missing or somebody else's
+    return folder
+
+
+def _removed(path: Path) -> bool:
+    """Remove a file; whether it is gone now."""
+    try:
+        path.unlink(missing_ok=True)
+    except OSError as error:
+        _log.warning("%s: cannot be removed (%s)", path, error.strerror)
+        return False
+    return True
 
 
 def _parsed(whole: memoryview) -> Entry:
-    """The contents of a file.
-
-    Raises:
-        ValueError, KeyError, TypeError, struct.error: they are not what was written.
-    """
+    """The contents of a file; an exception of any kind if they are not what was written."""
     magic, length, text_length, digest = HEADER.unpack(whole[: HEADER.size])
     if magic != MAGIC:
         raise ValueError("not a file of maps")

@@ -220,12 +220,13 @@ def methods() -> None:
 
 @contextmanager
 def _maps_kept(folder: Path | None, no_cache: bool) -> Iterator[None]:
-    """Keep maps on disk inside this block. Where the user's own folder cannot be written there is no cache."""
+    """Keep maps on disk inside this block. Where the user's own folder is of no use there is no cache, and a line."""
     try:
         cache = None if no_cache else MapCache(folder)
-    except InputError:
+    except InputError as error:
         if folder is not None:
             raise
+        print(f"ldtrefl: no maps are kept on disk: {error}", file=sys.stderr)
         cache = None
     keep_maps_in(cache)
     try:

@@ -18,6 +18,7 @@ import warp as wp
 
 from ldtrefl import warp_abi
 from ldtrefl.errors import InputError
+from ldtrefl.image import decoded_bytes
 from ldtrefl.mesh import Mesh
 from ldtrefl.scene import Camera, Light, Object, Scene
 from ldtrefl.strays import stray_array
@@ -53,8 +54,10 @@ class ObjectRecord:
     mirror: wp.vec3
     part_first: wp.array(dtype=wp.int32)  # first triangle of each part
     part_color: wp.array(dtype=wp.vec3)
-    part_texture: wp.array(dtype=wp.vec3i)  # first texel, width, height; width 0 without a texture
-    texels: wp.array(dtype=wp.vec3)  # all parts' textures, row 0 at v = 1
+    part_texture: wp.array(dtype=wp.vec4i)  # first texel, width, height, 1 for bytes; width 0 without a texture
+    texels: wp.array(dtype=wp.vec3)  # all parts' textures of floats, row 0 at v = 1
+    texel_bytes: wp.array(dtype=wp.vec3ub)  # and those of 8 bits, sRGB
+    decoded: wp.array(dtype=float)  # the linear value of every byte
 
 
 @wp.struct
@@ -76,7 +79,10 @@ class LightingRecord:
     sky: wp.vec3
     ground: wp.vec3
     up: wp.vec3  # unit
-    image: wp.array2d(dtype=wp.vec3)  # equirectangular; empty without one
+    image_size: wp.vec2i  # rows and columns of the equirectangular picture; 0 without one
+    image: wp.array2d(dtype=wp.vec3)  # its pixels if they are floats
+    image_bytes: wp.array2d(dtype=wp.vec3ub)  # and if they have 8 bits, sRGB; the other one is empty
+    decoded: wp.array(dtype=float)  # the linear value of every byte
     shadows: int
 
 
@@ -143,6 +149,7 @@ class DeviceScene:
         self.device = device
         self._skip_attributes = skip_attributes
         self.device_from_world = _device_from_world(scene)
+        self._decoded = wp.array(decoded_bytes(), dtype=float, device=device, copy=False)
         former = [] if before is None else before.objects
         same_space = before is not None and np.array_equal(self.device_from_world, before.device_from_world)
         meshes = {id(entry.geometry.mesh): entry.geometry for entry in former}
@@ -237,22 +244,23 @@ class DeviceScene:
         textures = [part.texture for part in mesh.parts]
         if source.texture is not None:
             textures = [source.texture] * len(mesh.parts)
-        texels: list[np.ndarray] = []
-        places: dict[int, tuple[int, int, int]] = {}
-        count = 0
+        pools: dict[type, list[np.ndarray]] = {np.float32: [], np.uint8: []}
+        places: dict[int, tuple[int, int, int, int]] = {}
         for texture in textures:
             if texture is not None and id(texture) not in places:
-                places[id(texture)] = (count, texture.shape[1], texture.shape[0])
-                texels.append(texture.reshape(-1, 3))
-                count += len(texels[-1])
-        needs_uvs = texels or not self._skip_attributes
+                kind = np.uint8 if texture.dtype == np.uint8 else np.float32
+                first = sum(len(pool) for pool in pools[kind])
+                places[id(texture)] = (first, texture.shape[1], texture.shape[0], int(kind is np.uint8))
+                pools[kind].append(np.ascontiguousarray(texture, kind).reshape(-1, 3))
+        needs_uvs = places or not self._skip_attributes
         record.uvs = geometry.uvs if needs_uvs else wp.empty(0, dtype=wp.vec2, device=self.device)
-        table = [(0, 0, 0) if texture is None else places[id(texture)] for texture in textures]
-        pool = np.concatenate(texels) if texels else np.zeros((0, 3), np.float32)
+        table = [(0, 0, 0, 0) if texture is None else places[id(texture)] for texture in textures]
         record.part_first = wp.array([p.first_triangle for p in mesh.parts], dtype=wp.int32, device=self.device)
         record.part_color = wp.array([p.color for p in mesh.parts], dtype=wp.vec3, device=self.device)
-        record.part_texture = wp.array(table, dtype=wp.vec3i, device=self.device)
-        record.texels = wp.array(pool, dtype=wp.vec3, device=self.device)
+        record.part_texture = wp.array(table, dtype=wp.vec4i, device=self.device)
+        record.texels = _uploaded(pools[np.float32], wp.vec3, self.device)
+        record.texel_bytes = _uploaded(pools[np.uint8], wp.vec3ub, self.device)
+        record.decoded = self._decoded
 
     def _lighting(self, before: DeviceScene | None) -> Any:
         scene = self.scene
@@ -266,11 +274,15 @@ class DeviceScene:
         record.ambient = wp.vec3(*scene.lighting.ambient)
         record.sky, record.ground = wp.vec3(*scene.environment.sky), wp.vec3(*scene.environment.ground)
         if before is not None and before.scene.environment is scene.environment:
-            record.image = before.lighting.image
+            for name in ("image_size", "image", "image_bytes"):
+                setattr(record, name, getattr(before.lighting, name))
         else:
             image = scene.environment_image
-            image = np.zeros((0, 0, 3), np.float32) if image is None else image
-            record.image = wp.array(image, dtype=wp.vec3, device=self.device)
+            record.image_size = wp.vec2i(0, 0) if image is None else wp.vec2i(*image.shape[:2])
+            for name, kind, dtype in (("image", np.float32, wp.vec3), ("image_bytes", np.uint8, wp.vec3ub)):
+                own = image if image is not None and image.dtype == kind else np.empty((0, 0, 3), kind)
+                setattr(record, name, wp.array(own, dtype=dtype, device=self.device, copy=False))
+        record.decoded = self._decoded
         record.shadows = int(scene.lighting.shadows)
         return record
 
@@ -285,6 +297,25 @@ class DeviceScene:
             record.towards = wp.vec3(*(towards / np.linalg.norm(towards)))
             record.radiance = wp.vec3(*light.radiance)
         return record
+
+
+def _uploaded(pools: list[np.ndarray], dtype: Any, device: wp.Device) -> wp.array:
+    """(n, 3) arrays, one after the other, on a device. On the CPU a single one is read where it lies: it may be large.
+
+    Raises:
+        InputError: they are more than can be numbered.
+    """
+    total = sum(len(pool) for pool in pools)
+    if total > np.iinfo(np.int32).max:
+        raise InputError(f"an object's textures have {total} texels, at most {np.iinfo(np.int32).max} allowed")
+    if len(pools) == 1:
+        return wp.array(pools[0], dtype=dtype, device=device, copy=False)
+    joined = wp.empty(total, dtype=dtype, device=device)
+    first = 0
+    for pool in pools:
+        wp.copy(joined, wp.array(pool, dtype=dtype, device=device, copy=False), dest_offset=first)
+        first += len(pool)
+    return joined
 
 
 def _device_from_world(scene: Scene) -> np.ndarray:

@@ -109,7 +109,10 @@ class Grid:
 
     @classmethod
     def unpacked(cls, arrays: dict[str, np.ndarray], values: dict[str, Any], geometry: DeviceMesh) -> Grid:
-        """The grid of a mesh on a device from what :meth:`packed` gave; on the CPU it shares the arrays' memory."""
+        """The grid of a mesh on a device from what :meth:`packed` gave; on the CPU it shares the arrays' memory.
+
+        What comes from a file is checked first (``grid_check.py``).
+        """
         view = GridView()
         for name, dtype in _DTYPES.items():
             setattr(view, name, wp.array(arrays[name], dtype=dtype, device=geometry.vertices.device, copy=False))

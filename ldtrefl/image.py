@@ -1,24 +1,45 @@
 """Pictures in files: PNG (sRGB, 8 bits), EXR (linear float), and difference pictures.
 
 In memory an image is ``(height, width, 3)`` float32, linear radiance, row 0 at the top. Files are read and written by
-OpenImageIO.
+OpenImageIO, a few rows at a time.
+
+A *stored* picture is what textures and environments are kept as, and its type says how it is encoded: ``uint8`` is
+sRGB, ``float32`` is linear. Pictures of 8 bits stay as they are, 3 bytes a pixel; all others take 12 bytes a pixel.
+
+What a file means by its numbers:
+
+- Floats are linear and integers are encoded as sRGB, unless the file says the opposite of itself (PNG's ``gAMA`` of 1,
+  TIFF's and EXR's colour space). Other gammas and profiles count as sRGB, as in glTF.
+- Colours are not multiplied by alpha, and alpha is left out. (In EXR they are stored multiplied, and stay so.)
+- Of an EXR the channels R, G and B are taken, of its first part and first layer that has them; else Y, or the first
+  channel, as grey.
+- A picture stands as it is stored: a camera's note to turn it (EXIF orientation) is not followed.
+- Negative values stay.
 """
 
 from __future__ import annotations
 
+import functools
+import weakref
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import OpenImageIO as oiio
 
+from ldtrefl import budget
 from ldtrefl.errors import InputError
-from ldtrefl.files import writable_folder, written_whole
+from ldtrefl.files import replaceable, writable_folder, written_whole
 from ldtrefl.native import caught_stderr
 
 WRITABLE = (".png", ".exr")
-LINEAR_FORMATS = ("openexr", "hdr")
-MAX_READ_PIXELS = 1 << 28
-"""Pixels that a picture which is read may have: a header that asks for more is broken or hostile."""
+
+BYTES_AT_ONCE = 32 << 20
+"""Of a picture that is read or written: some rows of the largest."""
+
+_AS_STORED = oiio.ImageSpec()
+_AS_STORED.attribute("oiio:UnassociatedAlpha", 1)  # or else colours come multiplied by alpha
 
 
 def srgb_from_linear(linear: np.ndarray) -> np.ndarray:
@@ -33,49 +54,141 @@ def linear_from_srgb(encoded: np.ndarray) -> np.ndarray:
     return np.where(x <= 0.04045, x / 12.92, np.power((x + 0.055) / 1.055, 2.4)).astype(np.float32)
 
 
+@functools.cache
+def decoded_bytes() -> np.ndarray:
+    """(256,) float32: the linear value of every byte of a stored picture."""
+    table = linear_from_srgb(np.arange(256, dtype=np.float32) * np.float32(1.0 / 255.0))
+    table.flags.writeable = False
+    return table
+
+
 def load_image(path: str | Path) -> np.ndarray:
-    """Read a picture as ``(h, w, 3)`` float32, linear: EXR and HDR as they are, other formats decoded from sRGB.
+    """Read a picture as ``(h, w, 3)`` float32, linear.
 
     Raises:
-        InputError: the file is missing, not a picture, or holds values that are not finite.
+        InputError: the file is missing, not a picture, larger than allowed, or holds values that are not finite.
+    """
+    stored = _read(Path(path))
+    if stored.dtype != np.uint8:
+        return stored
+    _take(f"{path}: as floats a", stored.shape[1], stored.shape[0], np.float32)
+    return decoded_bytes()[stored]
+
+
+def stored_picture(path: str | Path) -> np.ndarray:
+    """Read a picture as it is stored: ``(h, w, 3)`` uint8, sRGB, or float32, linear. It is not to be changed.
+
+    A file is read once while anybody holds its picture, and again only when it has changed.
+
+    Raises:
+        InputError: as :func:`load_image`.
     """
     path = Path(path)
+    try:
+        status = path.stat()
+    except (OSError, ValueError):
+        return _read(path)
+    key = (str(path.resolve()), status.st_mtime_ns, status.st_size)
+    picture = _pictures.get(key)
+    if picture is None:
+        picture = _read(path)
+        picture.flags.writeable = False
+        _pictures[key] = picture
+    return picture
+
+
+_pictures: weakref.WeakValueDictionary[tuple[str, int, int], np.ndarray] = weakref.WeakValueDictionary()
+
+
+def _read(path: Path) -> np.ndarray:
+    """A picture as it is stored, three channels."""
     if not path.is_file():
         raise InputError(f"{path}: no such picture")
     with caught_stderr():  # the formats' own libraries print what they find
-        reader = oiio.ImageInput.open(str(path))
+        reader = oiio.ImageInput.open(str(path), _AS_STORED)
         if reader is None:
             oiio.geterror()
             raise InputError(f"{path}: not a picture that can be read (EXR, HDR, PNG or JPEG)")
         try:
-            spec = reader.spec()
-            if not 0 < spec.width * spec.height <= MAX_READ_PIXELS:
-                raise InputError(f"{path}: {spec.width} x {spec.height} pixels, at most {MAX_READ_PIXELS} allowed")
-            pixels = reader.read_image(oiio.FLOAT)
-            linear = reader.format_name() in LINEAR_FORMATS
+            return _read_colors(reader, path)
         finally:
             reader.close()
-    if pixels is None:
-        raise InputError(f"{path}: the picture is cut off or damaged")
-    pixels = np.asarray(pixels, np.float32).reshape(spec.height, spec.width, -1)
-    rgb = np.repeat(pixels[..., :1], 3, axis=2) if pixels.shape[2] < 3 else pixels[..., :3]
-    if not np.isfinite(rgb).all():
-        raise InputError(f"{path}: the picture holds values that are not finite")
-    return np.ascontiguousarray(rgb if linear else linear_from_srgb(rgb))
+
+
+def _read_colors(reader: Any, path: Path) -> np.ndarray:
+    spec = reader.spec()
+    if spec.deep or spec.depth > 1 or min(spec.width, spec.height, spec.nchannels) < 1:
+        raise InputError(f"{path}: a flat picture is needed, not {spec.width} x {spec.height} x {spec.depth} pixels")
+    is_linear = _is_linear(spec)
+    dtype = np.uint8 if spec.format == oiio.UINT8 and not is_linear else np.float32
+    _take(f"{path}: a", spec.width, spec.height, dtype)
+    channels = _color_channels([name.lower() for name in spec.channelnames])
+    first, end = min(channels), max(channels) + 1
+    picture = np.empty((spec.height, spec.width, 3), dtype)
+    for top, rows in _row_by_row(reader, first, end, oiio.UINT8 if dtype is np.uint8 else oiio.FLOAT):
+        if rows is None:
+            raise InputError(f"{path}: the picture is cut off or damaged")
+        into = picture[top : top + len(rows)]
+        for k in range(3):
+            into[..., k] = rows[..., channels[k % len(channels)] - first]
+        if dtype is np.float32:
+            if not np.isfinite(into).all():
+                raise InputError(f"{path}: the picture holds values that are not finite")
+            if not is_linear:
+                into[:] = linear_from_srgb(into)
+    return picture
+
+
+def _take(what: str, width: int, height: int, dtype: Any) -> None:
+    needed = width * height * 3 * np.dtype(dtype).itemsize
+    budget.take(needed, f"{what} picture of {width} x {height} pixels", "a smaller picture")
+
+
+def _is_linear(spec: Any) -> bool:
+    """Whether a file's numbers are linear: floats are, integers are not, unless it says so itself."""
+    space = spec.get_string_attribute("oiio:ColorSpace").lower()
+    if spec.format in (oiio.HALF, oiio.FLOAT, oiio.DOUBLE):
+        return not space.startswith("srgb")
+    return space.startswith("lin")
+
+
+def _color_channels(names: list[str]) -> tuple[int, ...]:
+    """The numbers of red, green and blue, or of one channel that is grey, by the channels' names in small letters."""
+    layers = [name.removesuffix("r") for name in names if name == "r" or name.endswith(".r")]
+    for layer in sorted(layers, key=bool):  # the one without a name first
+        if {layer + "g", layer + "b"} <= set(names):
+            return tuple(names.index(layer + color) for color in "rgb")
+    if "y" in names or len(names) < 3:
+        return (names.index("y") if "y" in names else 0,)
+    return 0, 1, 2
+
+
+def _row_by_row(reader: Any, first: int, end: int, kind: Any) -> Iterator[tuple[int, np.ndarray | None]]:
+    """(number of the first row, ``(rows, width, channels)``) from the top down; None for rows that cannot be read."""
+    spec = reader.spec()
+    height = spec.tile_height if spec.tile_width else 1
+    step = height * max(1, BYTES_AT_ONCE // (4 * spec.width * (end - first) * height))
+    for top in range(0, spec.height, step):
+        bottom = min(top + step, spec.height)
+        y0, y1 = spec.y + top, spec.y + bottom
+        if spec.tile_width:
+            rows = reader.read_tiles(0, 0, spec.x, spec.x + spec.width, y0, y1, spec.z, spec.z + 1, first, end, kind)
+        else:
+            rows = reader.read_scanlines(0, 0, y0, y1, spec.z, first, end, kind)
+        yield top, None if rows is None else np.asarray(rows).reshape(bottom - top, spec.width, end - first)
 
 
 def check_writable(path: str | Path) -> Path:
     """Refuse an output file that cannot be written, before any work is spent on it.
 
     Raises:
-        InputError: wrong ending, a folder in its place, or a folder that is missing or closed.
+        InputError: wrong ending; a folder, a pipe, a device or a protected file in its place; or a folder that is
+            missing or closed.
     """
     path = Path(path)
     if path.suffix.lower() not in WRITABLE:
         raise InputError(f"{path}: a picture's name ends in {' or '.join(WRITABLE)}")
-    if path.is_dir():
-        raise InputError(f"{path}: is a folder, a file name is needed")
-    folder = path.parent
+    folder = replaceable(path).parent
     if not folder.is_dir():
         raise InputError(f"{path}: the folder {folder} does not exist")
     try:
@@ -88,6 +201,8 @@ def check_writable(path: str | Path) -> Path:
 def save_image(path: str | Path, image: np.ndarray) -> None:
     """Write linear ``(h, w, 3)`` radiance as PNG (encoded to sRGB, clipped) or EXR (linear float32).
 
+    What stands in the file is read back and compared: the libraries that write do not notice every full disk.
+
     Raises:
         InputError: the path cannot be written, or the image is not ``(h, w, 3)``.
     """
@@ -95,18 +210,44 @@ def save_image(path: str | Path, image: np.ndarray) -> None:
     image = np.asarray(image, np.float32)
     if image.ndim != 3 or image.shape[2] != 3 or image.size == 0:
         raise InputError(f"{path}: an image is (height, width, 3), got {image.shape}")
-    if path.suffix.lower() == ".png":
-        pixels = np.round(srgb_from_linear(image) * 255.0).astype(np.uint8)
-        spec = oiio.ImageSpec(image.shape[1], image.shape[0], 3, oiio.UINT8)
-        spec.attribute("oiio:ColorSpace", "sRGB")
-    else:
-        pixels = np.ascontiguousarray(image)
-        spec = oiio.ImageSpec(image.shape[1], image.shape[0], 3, oiio.FLOAT)
-        spec.attribute("oiio:ColorSpace", "linear")
-    with written_whole(path) as scratch:
-        writer = oiio.ImageOutput.create(str(scratch))
-        if not (writer and writer.open(str(scratch), spec) and writer.write_image(pixels) and writer.close()):
-            raise InputError(f"{path}: could not be written ({oiio.geterror() or 'disk full?'})")
+    is_png = path.suffix.lower() == ".png"
+    with written_whole(path) as scratch, caught_stderr():
+        if not (_written(scratch, image, is_png) and _reads_back(scratch, image, is_png)):
+            raise InputError(f"{path}: could not be written ({oiio.geterror() or 'is the disk full?'})")
+
+
+def _encoded(rows: np.ndarray, is_png: bool) -> np.ndarray:
+    """Rows of an image as they stand in the file."""
+    return np.round(srgb_from_linear(rows) * 255.0).astype(np.uint8) if is_png else np.ascontiguousarray(rows)
+
+
+def _written(path: Path, image: np.ndarray, is_png: bool) -> bool:
+    """Write a file; whether nothing was said against it."""
+    height, width, channels = image.shape
+    spec = oiio.ImageSpec(width, height, channels, oiio.UINT8 if is_png else oiio.FLOAT)
+    spec.attribute("oiio:ColorSpace", "sRGB" if is_png else "linear")
+    writer = oiio.ImageOutput.create(str(path))
+    if not (writer and writer.open(str(path), spec)):
+        return False
+    step = max(1, BYTES_AT_ONCE // image[0].nbytes)
+    parts = (slice(top, min(top + step, height)) for top in range(0, height, step))
+    good = all(writer.write_scanlines(part.start, part.stop, 0, _encoded(image[part], is_png)) for part in parts)
+    return bool(writer.close()) and good
+
+
+def _reads_back(path: Path, image: np.ndarray, is_png: bool) -> bool:
+    """Whether a file holds every bit of an image."""
+    reader = oiio.ImageInput.open(str(path))
+    if reader is None:
+        return False
+    try:
+        size = (reader.spec().height, reader.spec().width, reader.spec().nchannels)
+        return size == image.shape and all(
+            rows is not None and rows.tobytes() == _encoded(image[top : top + len(rows)], is_png).tobytes()
+            for top, rows in _row_by_row(reader, 0, 3, oiio.UINT8 if is_png else oiio.FLOAT)
+        )
+    finally:
+        reader.close()
 
 
 def difference_image(image: np.ndarray, reference: np.ndarray, gain: float = 4.0) -> np.ndarray:

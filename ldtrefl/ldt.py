@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
@@ -18,17 +17,39 @@ from ldtrefl.cubemap import FACE_NAMES, TexelFrame, texel_frame
 from ldtrefl.device_scene import DeviceMesh
 from ldtrefl.errors import InputError, first_fault, unknown_name
 from ldtrefl.files import written_whole
+from ldtrefl.fingerprint import fingerprint
 from ldtrefl.fragments import LdtView
 from ldtrefl.grid import Grid
 from ldtrefl.grid_build import Quality, build_grid
+from ldtrefl.grid_check import check_grid
 from ldtrefl.march import TRACERS
 from ldtrefl.march_exact import GRAZING
 from ldtrefl.mesh import Mesh
-from ldtrefl.peel import Maps, Rasteriser, sort_fragments, sorted_maps
+from ldtrefl.npz import read_arrays
+from ldtrefl.peel import Maps, Rasteriser, check_fragments, check_order, sort_fragments, sorted_maps
 from ldtrefl.trace import Hits, array_of_views, trace_batch, trace_rays
 
 FORMAT = 1
 """Of saved files; goes up when what they hold changes."""
+
+SAVED = {
+    "format": (np.int64, ()),
+    "vertices": (np.float64, (None, 3)),
+    "faces": (np.int32, (None, 3)),
+    "normals": (np.float32, (None, 3)),
+    "size": (np.int64, (3,)),
+    "scale": (np.float64, ()),
+    "offset": (np.float64, (3,)),
+    "start": (np.int32, (None,)),
+    "depth": (np.float32, (None,)),
+    "reference": (np.int32, (None,)),
+}
+"""The arrays of a saved file: type and shape, None where any number will do."""
+
+MOST_TEXELS = 4096
+"""Along an object's longest side."""
+LARGEST = 1e30
+"""Of a scale and an offset that are read: they are handed to kernels as float32."""
 
 DEFAULT_RESOLUTION = 256
 """Texels along an object's longest side."""
@@ -49,7 +70,7 @@ RAYS_ALL_AROUND = 4096
 FEW_BACKS = 2
 """Of so many rays so few may meet a back in a closed mesh that is wound one way: one in 100,000 slips through."""
 
-_RESOLUTION = TypeAdapter(Annotated[int, Field(strict=True, ge=1, le=4096)])
+_RESOLUTION = TypeAdapter(Annotated[int, Field(strict=True, ge=1, le=MOST_TEXELS)])
 _QUALITY = TypeAdapter(Quality)
 
 
@@ -77,8 +98,12 @@ class LayeredDepthTexture:
 
     @functools.cached_property
     def _maps(self) -> Maps:
-        device = self.geometry.vertices.device
-        return self._kept("maps", self._make_maps, lambda entry: Maps.unpacked(entry.arrays, device))
+        return self._kept("maps", self._make_maps, self._read_maps)
+
+    def _read_maps(self, entry: Entry) -> Maps:
+        check_fragments(self.frame, len(self.geometry.faces), entry.arrays)
+        check_order(entry.arrays)
+        return Maps.unpacked(entry.arrays, self.geometry.vertices.device)
 
     def _make_maps(self) -> Maps:
         return sort_fragments(self.frame, self._rasteriser.fragments())
@@ -86,8 +111,11 @@ class LayeredDepthTexture:
     @functools.cached_property
     def grid(self) -> Grid:
         """The occupancy grid that the exact search walks."""
-        geometry = self.geometry
-        return self._kept("grid", self._make_grid, lambda entry: Grid.unpacked(entry.arrays, entry.values, geometry))
+        return self._kept("grid", self._make_grid, self._read_grid)
+
+    def _read_grid(self, entry: Entry) -> Grid:
+        check_grid(entry.arrays, entry.values, len(self.geometry.faces))
+        return Grid.unpacked(entry.arrays, entry.values, self.geometry)
 
     def _make_grid(self) -> Grid:
         made = build_grid(self.geometry, self.resolution, self.quality, trusted=self.trusted)
@@ -101,11 +129,11 @@ class LayeredDepthTexture:
         if cache is None or len(mesh.faces) < WORTH_KEEPING:
             return make()
         options = {"kind": kind, "resolution": self.resolution, "quality": self.quality, "trusted": self.trusted}
-        key = key_of([mesh.vertices, mesh.faces], options)
-        entry = cache.load(key)
-        self.from_cache = entry is not None
-        if entry is not None:
-            return read(entry)
+        key = key_of([mesh.vertices, mesh.faces], {**options, "algorithm": fingerprint("ldt")})
+        kept = cache.load(key, read)
+        self.from_cache = kept is not None
+        if kept is not None:
+            return kept
         made = make()
         cache.store(key, *made.packed())
         return made
@@ -245,30 +273,40 @@ class LayeredDepthTexture:
         """Read what :meth:`save` wrote.
 
         Raises:
-            InputError: the file is missing, damaged, or of another format.
+            InputError: the file is missing, damaged, of another format, or larger than the memory allowed.
         """
         target = launch.resolve_device(device)
         try:
-            with np.load(path, allow_pickle=False) as stored:
-                if int(stored["format"]) != FORMAT:
-                    raise InputError(f"{path}: format {int(stored['format'])}, this version reads {FORMAT}")
-                mesh = Mesh(stored["vertices"], stored["faces"], stored["normals"])
-                x, y, z = (int(n) for n in stored["size"])
-                ox, oy, oz = (float(o) for o in stored["offset"])
-                frame = TexelFrame((x, y, z), float(stored["scale"]), (ox, oy, oz))
-                start, depth, reference = (stored[name] for name in ("start", "depth", "reference"))
-        except InputError as error:
-            raise error.within(str(path)) from None
-        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
-            raise InputError(f"{path}: not a layered depth texture that can be read ({error})") from error
-        _check(frame, start, depth, reference, len(mesh.faces), path)
+            arrays = read_arrays(path, SAVED)
+            if arrays["format"] != FORMAT:
+                raise InputError(f"format {arrays['format']}, this version reads {FORMAT}")
+            mesh, frame = _mesh_and_frame(arrays)
+            check_fragments(frame, len(mesh.faces), arrays)
+        except (ValueError, KeyError) as error:  # an InputError is a ValueError
+            raise InputError(f"{path}: not a layered depth texture that can be read ({error})") from None
         loaded = cls(DeviceMesh(mesh, target), frame)
         loaded._maps = sorted_maps(
-            wp.array(start, dtype=wp.int32, device=target),
-            wp.array(depth, dtype=wp.float32, device=target),
-            wp.array(reference, dtype=wp.int32, device=target),
+            wp.array(arrays["start"], dtype=wp.int32, device=target),
+            wp.array(arrays["depth"], dtype=wp.float32, device=target),
+            wp.array(arrays["reference"], dtype=wp.int32, device=target),
         )
         return loaded
+
+
+def _mesh_and_frame(arrays: dict[str, np.ndarray]) -> tuple[Mesh, TexelFrame]:
+    """What the arrays of a saved file say of the mesh and of its box of texels.
+
+    Raises:
+        ValueError: it cannot be.
+    """
+    mesh = Mesh(arrays["vertices"], arrays["faces"], arrays["normals"])
+    x, y, z = (int(n) for n in arrays["size"])
+    scale, offset = float(arrays["scale"]), arrays["offset"]
+    if not (min(x, y, z) >= 1 and max(x, y, z) <= MOST_TEXELS):
+        raise ValueError(f"{x} x {y} x {z} texels, 1 to {MOST_TEXELS} allowed")
+    if not (np.isfinite(arrays["normals"]).all() and 0.0 < scale < LARGEST and (np.abs(offset) < LARGEST).all()):
+        raise ValueError("a normal, the scale or the offset is not finite")
+    return mesh, TexelFrame((x, y, z), scale, (float(offset[0]), float(offset[1]), float(offset[2])))
 
 
 def _shows_backs(grid: Grid) -> bool:
@@ -290,21 +328,6 @@ def _rays_all_around(device: str) -> tuple[wp.array, wp.array]:
     directions = rng.uniform(-1.0, 1.0, (RAYS_ALL_AROUND, 3)) - origins
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     return wp.array(origins, dtype=wp.vec3, device=device), wp.array(directions, dtype=wp.vec3, device=device)
-
-
-def _check(frame: TexelFrame, start: Any, depth: Any, reference: Any, triangles: int, path: Any) -> None:
-    """Refuse maps whose numbers would send a kernel outside its arrays."""
-    sound = (
-        min(frame.size) >= 1
-        and start.shape == (frame.first_texels[3] + 1,)
-        and depth.shape == reference.shape == (int(start[-1]),)
-        and int(start[0]) == 0
-        and bool((np.diff(start) >= 0).all())
-        and bool(np.isfinite(depth).all())
-        and bool(((reference >= 0) & (reference >> 1 < triangles)).all())
-    )
-    if not sound:
-        raise InputError(f"{path}: the maps are damaged")
 
 
 def peel(

@@ -16,7 +16,7 @@ import trimesh
 
 from ldtrefl.bulk import stray_triangles
 from ldtrefl.errors import InputError
-from ldtrefl.image import linear_from_srgb
+from ldtrefl.pillow_pictures import no_pixel_limit, picture_of, stored_from_pillow, take_pictures
 
 MAX_TRIANGLES = 1 << 30
 """Triangle numbers are int32 and a fragment keeps one bit of it for the facing."""
@@ -34,7 +34,7 @@ class Part:
     color: tuple[float, float, float] = (1.0, 1.0, 1.0)
     """Linear base colour, times the scene's albedo."""
     texture: np.ndarray | None = None
-    """``(h, w, 3)`` float32 linear, row 0 at v = 1; None without one."""
+    """``(h, w, 3)`` uint8, sRGB, or float32, linear, row 0 at v = 1; None without one. It is not to be changed."""
 
 
 class Mesh:
@@ -172,7 +172,8 @@ def load_mesh(path: str | Path) -> Mesh:
         stat = path.stat()
     except OSError as error:
         raise InputError(f"{path}: no such mesh ({error.strerror})") from error
-    return _load_mesh(str(path.resolve()), stat.st_mtime_ns, stat.st_size)
+    with no_pixel_limit():
+        return _load_mesh(str(path.resolve()), stat.st_mtime_ns, stat.st_size)
 
 
 @functools.lru_cache(maxsize=32)
@@ -182,9 +183,10 @@ def _load_mesh(path: str, _modified: int, _size: int) -> Mesh:
         raise InputError(f"{path}: not a kind of mesh file that can be read (allowed: {kinds})")
     try:
         loaded = trimesh.load_scene(path, process=False, maintain_order=True)
+        take_pictures([getattr(geometry.visual, "material", None) for geometry in loaded.geometry.values()])
         pieces = [piece for piece in loaded.dump() if isinstance(piece, trimesh.Trimesh) and len(piece.faces)]
-    except InputError:
-        raise
+    except InputError as error:
+        raise error.within(path) from None
     except Exception as error:  # whatever a damaged file provokes in a reader is the file's fault
         raise InputError(f"{path}: not a mesh that can be read ({type(error).__name__}: {error})") from error
     if not pieces:
@@ -238,7 +240,7 @@ def _uvs(piece: trimesh.Trimesh) -> np.ndarray | None:
 
 
 def _look(piece: trimesh.Trimesh) -> tuple[tuple[float, float, float], np.ndarray | None]:
-    """A piece's base colour and texture, both linear (glTF: factors are linear, textures sRGB)."""
+    """A piece's base colour, linear, and its texture as it is stored (glTF: factors are linear, textures sRGB)."""
     material = getattr(piece.visual, "material", None)
     if material is None:
         return (1.0, 1.0, 1.0), None
@@ -248,7 +250,5 @@ def _look(piece: trimesh.Trimesh) -> tuple[tuple[float, float, float], np.ndarra
         scale = 255.0 if np.asarray(factor).dtype.kind in "iu" else 1.0
         r, g, b = (float(channel) / scale for channel in np.asarray(factor)[:3])
         color = (r, g, b)
-    picture = getattr(material, "baseColorTexture", None) or getattr(material, "image", None)
-    if picture is None:
-        return color, None
-    return color, linear_from_srgb(np.asarray(picture.convert("RGB"), np.float32) / 255.0)
+    picture = picture_of(material)
+    return color, None if picture is None else stored_from_pillow(picture)

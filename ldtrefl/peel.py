@@ -327,7 +327,10 @@ class Maps:
 
     @classmethod
     def unpacked(cls, arrays: dict[str, np.ndarray], device: wp.Device) -> Maps:
-        """Maps from what :meth:`packed` gave; on the CPU they share the arrays' memory."""
+        """Maps from what :meth:`packed` gave; on the CPU they share the arrays' memory.
+
+        What comes from a file is checked first: :func:`check_fragments`, :func:`check_order`.
+        """
         dtypes = {"start": wp.int32, "depth": wp.float32, "reference": wp.int32, "balanced": wp.uint8}
         return cls(**{k: wp.array(arrays[k], dtype=dtype, device=device, copy=False) for k, dtype in dtypes.items()})
 
@@ -354,3 +357,35 @@ def sorted_maps(start: wp.array, depth: wp.array, reference: wp.array) -> Maps:
     balanced = wp.empty(texels, dtype=wp.uint8, device=start.device)
     launch.launch(sort_texels, texels, [start, depth, reference, balanced], start.device)
     return Maps(start, depth, reference, balanced)
+
+
+def check_fragments(frame: TexelFrame, triangles: int, arrays: dict[str, np.ndarray]) -> None:
+    """Check maps that come from a file, for a mesh of so many triangles, before a kernel reads what they point to.
+
+    Raises:
+        ValueError, KeyError: they are not sound; the message says what.
+    """
+    start, depth, reference = (arrays[name] for name in ("start", "depth", "reference"))
+    for array, dtype in ((start, np.int32), (depth, np.float32), (reference, np.int32)):
+        if array.dtype != dtype or array.ndim != 1:
+            raise ValueError("arrays of another type")
+    if start.shape != (frame.first_texels[3] + 1,) or start[0] != 0 or not (start[1:] >= start[:-1]).all():
+        raise ValueError("texels that do not follow each other")
+    if not depth.shape == reference.shape == (int(start[-1]),):
+        raise ValueError("fragments for other texels")
+    if not (np.isfinite(depth).all() and (reference >= 0).all() and (reference >> 1 < triangles).all()):
+        raise ValueError("a depth or a triangle that the mesh does not have")
+
+
+def check_order(arrays: dict[str, np.ndarray]) -> None:
+    """Check that the fragments of each texel are sorted, and what is known of the texel, after the rest.
+
+    Raises:
+        ValueError, KeyError: they are not.
+    """
+    start, depth, balanced = (arrays[name] for name in ("start", "depth", "balanced"))
+    falls = np.flatnonzero(depth[1:] < depth[:-1]) + 1
+    if not np.isin(falls, start).all():
+        raise ValueError("fragments out of order")
+    if balanced.dtype != np.uint8 or balanced.shape != (start.size - 1,) or balanced.max(initial=0) > 1:
+        raise ValueError("texels that are not known")

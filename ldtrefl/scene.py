@@ -21,7 +21,7 @@ from pydantic.dataclasses import dataclass
 
 from ldtrefl import shapes
 from ldtrefl.errors import InputError, first_fault, unknown_name
-from ldtrefl.image import load_image
+from ldtrefl.image import stored_picture
 from ldtrefl.mesh import Mesh, load_mesh
 
 MESH_PATH_VARIABLE = "LDTREFL_MESH_PATH"
@@ -179,8 +179,8 @@ class Object:
 
     @functools.cached_property
     def texture(self) -> np.ndarray | None:
-        """``material.texture`` as (h, w, 3) float32, linear; None without one."""
-        return None if self.material.texture is None else load_image(self.material.texture)
+        """``material.texture``: (h, w, 3) as it is stored, uint8, sRGB, or float32, linear; None without one."""
+        return None if self.material.texture is None else stored_picture(self.material.texture)
 
     @property
     def is_reflector(self) -> bool:
@@ -285,8 +285,8 @@ class Scene:
 
     @functools.cached_property
     def environment_image(self) -> np.ndarray | None:
-        """``environment.image`` as (h, w, 3) float32, linear; None without one."""
-        return None if self.environment.image is None else load_image(self.environment.image)
+        """``environment.image``: (h, w, 3) as it is stored, uint8, sRGB, or float32, linear; None without one."""
+        return None if self.environment.image is None else stored_picture(self.environment.image)
 
 
 _ADAPTER = TypeAdapter(Scene)

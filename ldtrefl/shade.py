@@ -53,7 +53,21 @@ def at_most_largest(radiance: wp.vec3) -> wp.vec3:
 
 
 @wp.func
-def sample_texture(texels: wp.array(dtype=wp.vec3), place: wp.vec3i, uv: wp.vec2) -> wp.vec3:
+def decoded_color(code: wp.vec3ub, decoded: wp.array(dtype=float)) -> wp.vec3:
+    """The linear colour of a pixel of 8 bits, by the table of its values."""
+    return wp.vec3(decoded[int(code[0])], decoded[int(code[1])], decoded[int(code[2])])
+
+
+@wp.func
+def texel(objects: wp.array(dtype=ObjectRecord), index: int, is_bytes: int, number: int) -> wp.vec3:
+    """A texel of an object's textures, linear."""
+    if is_bytes != 0:
+        return decoded_color(objects[index].texel_bytes[number], objects[index].decoded)
+    return objects[index].texels[number]
+
+
+@wp.func
+def sample_texture(objects: wp.array(dtype=ObjectRecord), index: int, place: wp.vec4i, uv: wp.vec2) -> wp.vec3:
     """Bilinear, repeating; v = 0 at the bottom row."""
     x = (uv[0] - wp.floor(uv[0])) * float(place[1]) - 0.5
     y = (1.0 - (uv[1] - wp.floor(uv[1]))) * float(place[2]) - 0.5
@@ -61,8 +75,10 @@ def sample_texture(texels: wp.array(dtype=wp.vec3), place: wp.vec3i, uv: wp.vec2
     fx, fy = x - left, y - top
     x0, y0 = (int(left) + place[1]) % place[1], (int(top) + place[2]) % place[2]
     x1, y1 = (x0 + 1) % place[1], (y0 + 1) % place[2]
-    upper = (1.0 - fx) * texels[place[0] + y0 * place[1] + x0] + fx * texels[place[0] + y0 * place[1] + x1]
-    lower = (1.0 - fx) * texels[place[0] + y1 * place[1] + x0] + fx * texels[place[0] + y1 * place[1] + x1]
+    upper_row, lower_row = place[0] + y0 * place[1], place[0] + y1 * place[1]
+    kind = place[3]
+    upper = (1.0 - fx) * texel(objects, index, kind, upper_row + x0) + fx * texel(objects, index, kind, upper_row + x1)
+    lower = (1.0 - fx) * texel(objects, index, kind, lower_row + x0) + fx * texel(objects, index, kind, lower_row + x1)
     return (1.0 - fy) * upper + fy * lower
 
 
@@ -70,10 +86,18 @@ def sample_texture(texels: wp.array(dtype=wp.vec3), place: wp.vec3i, uv: wp.vec2
 def environment_radiance(lighting: LightingRecord, direction: wp.vec3) -> wp.vec3:
     """What a ray of this unit direction sees that hits nothing."""
     height = wp.dot(direction, lighting.up)
-    if lighting.image.shape[0] == 0:
+    if lighting.image_size[0] == 0:
         blend = 0.5 + 0.5 * height
         return blend * lighting.sky + (1.0 - blend) * lighting.ground
     return _environment_image(lighting, direction, height)
+
+
+@wp.func
+def environment_pixel(lighting: LightingRecord, row: int, column: int) -> wp.vec3:
+    """A pixel of the environment's picture, linear."""
+    if lighting.image_bytes.shape[0] > 0:
+        return decoded_color(lighting.image_bytes[row, column], lighting.decoded)
+    return lighting.image[row, column]
 
 
 @wp.func
@@ -85,7 +109,7 @@ def _environment_image(lighting: LightingRecord, direction: wp.vec3, height: flo
         reference = wp.vec3(0.0, 1.0, 0.0)
     ahead = wp.normalize(reference - wp.dot(reference, lighting.up) * lighting.up)
     left = wp.cross(lighting.up, ahead)
-    rows, columns = lighting.image.shape[0], lighting.image.shape[1]
+    rows, columns = lighting.image_size[0], lighting.image_size[1]
     longitude = wp.atan2(wp.dot(direction, left), wp.dot(direction, ahead))
     x = (0.5 - longitude / wp.TAU) * float(columns) - 0.5
     y = wp.acos(wp.clamp(height, -1.0, 1.0)) / wp.PI * float(rows) - 0.5
@@ -94,8 +118,8 @@ def _environment_image(lighting: LightingRecord, direction: wp.vec3, height: flo
     x0 = (int(x0f) + columns) % columns
     x1 = (x0 + 1) % columns
     y0, y1 = wp.clamp(int(y0f), 0, rows - 1), wp.clamp(int(y0f) + 1, 0, rows - 1)
-    upper = (1.0 - fx) * lighting.image[y0, x0] + fx * lighting.image[y0, x1]
-    lower = (1.0 - fx) * lighting.image[y1, x0] + fx * lighting.image[y1, x1]
+    upper = (1.0 - fx) * environment_pixel(lighting, y0, x0) + fx * environment_pixel(lighting, y0, x1)
+    lower = (1.0 - fx) * environment_pixel(lighting, y1, x0) + fx * environment_pixel(lighting, y1, x1)
     return (1.0 - fy) * upper + fy * lower
 
 
@@ -211,7 +235,7 @@ def surface_at(objects: wp.array(dtype=ObjectRecord), index: int, triangle: int,
         uv = (
             w * objects[index].uvs[corners[0]] + u * objects[index].uvs[corners[1]] + v * objects[index].uvs[corners[2]]
         )
-        color = wp.cw_mul(color, sample_texture(objects[index].texels, place, uv))
+        color = wp.cw_mul(color, sample_texture(objects, index, place, uv))
     surface.albedo = color
     surface.emission = objects[index].emission
     surface.mirror = objects[index].mirror
