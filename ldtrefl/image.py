@@ -32,11 +32,20 @@ from ldtrefl import budget
 from ldtrefl.errors import InputError
 from ldtrefl.files import replaceable, writable_folder, written_whole
 from ldtrefl.native import caught_stderr
+from ldtrefl.pillow_limit import format_and_size
 
 WRITABLE = (".png", ".exr")
 
 BYTES_AT_ONCE = 32 << 20
 """Of a picture that is read or written: some rows of the largest."""
+
+HEADER_FIRST = (
+    *(b"v/1\x01", b"\x89PNG", b"#?", b"II*\0", b"MM\0*", b"II+\0", b"MM\0+", b"BM"),
+    *(b"P1", b"P2", b"P3", b"P4", b"P5", b"P6", b"PF", b"Pf"),
+)
+"""How files begin (EXR, PNG, HDR, TIFF, BMP, PNM) of which OpenImageIO reads the header alone when it opens them."""
+UNPACKED_AT_ONCE = {"JPEG2000": 12}
+"""Bytes a pixel that it takes to unpack others, which it may do when it opens them: 4 if not said here."""
 
 _AS_STORED = oiio.ImageSpec()
 _AS_STORED.attribute("oiio:UnassociatedAlpha", 1)  # or else colours come multiplied by alpha
@@ -51,7 +60,7 @@ def srgb_from_linear(linear: np.ndarray) -> np.ndarray:
 def linear_from_srgb(encoded: np.ndarray) -> np.ndarray:
     """Inverse of :func:`srgb_from_linear` on 0..1."""
     x = np.asarray(encoded, np.float32)
-    return np.where(x <= 0.04045, x / 12.92, np.power((x + 0.055) / 1.055, 2.4)).astype(np.float32)
+    return np.where(x <= 0.04045, x / 12.92, np.power((np.maximum(x, 0.0) + 0.055) / 1.055, 2.4)).astype(np.float32)
 
 
 @functools.cache
@@ -104,15 +113,37 @@ def _read(path: Path) -> np.ndarray:
     """A picture as it is stored, three channels."""
     if not path.is_file():
         raise InputError(f"{path}: no such picture")
+    _ask_for_unpacking(path)
     with caught_stderr():  # the formats' own libraries print what they find
         reader = oiio.ImageInput.open(str(path), _AS_STORED)
         if reader is None:
             oiio.geterror()
-            raise InputError(f"{path}: not a picture that can be read (EXR, HDR, PNG or JPEG)")
+            raise _unreadable(path)
         try:
             return _read_colors(reader, path)
         finally:
             reader.close()
+
+
+def _ask_for_unpacking(path: Path) -> None:
+    """Ask for the memory that opening a file may take, if it is of a format that may be unpacked then.
+
+    Raises:
+        InputError: it is more than is allowed, or the file is of no format whose size can be told.
+    """
+    try:
+        with path.open("rb") as file:
+            if file.read(4).startswith(HEADER_FIRST):
+                return
+        kind, width, height = format_and_size(path)
+    except Exception as error:  # whatever a damaged file provokes in a reader is the file's fault
+        raise _unreadable(path) from error
+    needed = width * height * UNPACKED_AT_ONCE.get(kind, 4)
+    budget.take(needed, f"{path}: unpacking {width} x {height} pixels", "a smaller picture")
+
+
+def _unreadable(path: Path) -> InputError:
+    return InputError(f"{path}: not a picture that can be read (EXR, HDR, PNG or JPEG)")
 
 
 def _read_colors(reader: Any, path: Path) -> np.ndarray:

@@ -16,7 +16,8 @@ import trimesh
 
 from ldtrefl.bulk import stray_triangles
 from ldtrefl.errors import InputError
-from ldtrefl.pillow_pictures import no_pixel_limit, picture_of, stored_from_pillow, take_pictures
+from ldtrefl.pillow_limit import no_pixel_limit
+from ldtrefl.pillow_pictures import picture_of, stored_from_pillow, take_pictures
 
 MAX_TRIANGLES = 1 << 30
 """Triangle numbers are int32 and a fragment keeps one bit of it for the facing."""

@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import threading
 import weakref
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -23,38 +19,6 @@ BYTES_A_PIXEL = 4 + 4 + 3
 ROWS_AT_ONCE = 256
 
 _by_content: weakref.WeakValueDictionary[bytes, np.ndarray] = weakref.WeakValueDictionary()
-
-
-@dataclass
-class _Limit:
-    """Pillow's own limit while nobody is inside :func:`no_pixel_limit`, and how many are."""
-
-    lock: threading.Lock = field(default_factory=threading.Lock)
-    inside: int = 0
-    kept: int | None = None
-
-
-_limit = _Limit()
-
-
-@contextmanager
-def no_pixel_limit() -> Iterator[None]:
-    """Pillow opens pictures of any size inside this block: here the memory allowed is the limit (``budget.py``).
-
-    Pillow warns of large pictures and refuses larger ones, which readers of meshes take for missing ones.
-    """
-    with _limit.lock:
-        if not _limit.inside:
-            _limit.kept = Image.MAX_IMAGE_PIXELS
-        _limit.inside += 1
-        Image.MAX_IMAGE_PIXELS = None
-    try:
-        yield
-    finally:
-        with _limit.lock:
-            _limit.inside -= 1
-            if not _limit.inside:
-                Image.MAX_IMAGE_PIXELS = _limit.kept
 
 
 def picture_of(material: Any) -> Image.Image | None:

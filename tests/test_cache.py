@@ -1,8 +1,12 @@
 """Maps on disk: the same answers, whole or absent, never trusted when damaged, and no more than the limit."""
 
+import importlib.util
 import logging
 import multiprocessing
 import os
+import shutil
+import stat
+import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,9 +15,15 @@ import pytest
 from stress_cases.judge import rays_about
 
 import ldtrefl
-from ldtrefl import shapes
-from ldtrefl.cache import HEADER, MapCache, keep_maps_in, key_of
+from ldtrefl import budget, launch, shapes
+from ldtrefl.cache import HEADER, Entry, MapCache, current_cache, keep_maps_in, key_of
 from ldtrefl.cli import main
+from ldtrefl.cubemap import texel_frame
+from ldtrefl.device_scene import DeviceMesh
+from ldtrefl.fingerprint import fingerprint
+from ldtrefl.grid_check import check_grid
+from ldtrefl.ldt import peel_mesh
+from ldtrefl.peel import check_fragments, check_order
 
 from .conftest import SMALL_SCENE
 
@@ -136,3 +146,292 @@ def test_command_line(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None
     assert main([*command, "--cache", folder, "--no-cache"]) == 2
     assert main([*command, "--cache", str(scene)]) == 2
     assert "\n" not in capfd.readouterr().err.strip().splitlines()[-1]
+
+
+def stored(quality: str = "exact", search: str = "exact", trusted: bool = False) -> tuple[DeviceMesh, Entry, MapCache]:
+    """A mesh, and what the cache in use holds of its maps."""
+    cache = current_cache()
+    assert cache is not None
+    geometry = DeviceMesh(shapes.make("torus_knot", {"segments": [130, 40]}), launch.resolve_device("cpu"))
+    peel_mesh(geometry, 32, quality=quality, search=search, trusted=trusted)
+    return geometry, cache.load(cache.files()[-1][0].stem), cache
+
+
+def changed(array: np.ndarray, place: int, value: float) -> np.ndarray:
+    """A copy with another number in one place."""
+    copied = array.copy()
+    copied[place] = value
+    return copied
+
+
+def as_float(bits: int) -> float:
+    """The float32 of these bits."""
+    return float(np.int32(bits).view(np.float32))
+
+
+@pytest.mark.parametrize("trusted", [False, True])
+def test_a_grid_is_checked_in_every_field(cache: MapCache, trusted: bool) -> None:
+    quality = "balanced" if trusted else "exact"
+    geometry, entry, _ = stored(quality, trusted=trusted)
+    count = len(geometry.faces)
+    check_grid(entry.arrays, entry.values, count)
+    assert entry.values["patches"] == trusted
+    row, rows = entry.arrays["row"], entry.arrays["rows"]
+    of_patches = int(np.flatnonzero(np.diff(row)[0::2])[0]) if trusted else -1
+    record = 8 * (int(row[2 * of_patches]) + 6) if trusted else 8 * (int(row[1]) + 12)
+    box = short_box(entry)
+    wrong = {
+        "leaps": [entry.arrays["leaps"][:-1], entry.arrays["leaps"].astype(np.int32)],
+        "node": [changed(entry.arrays["node"], -1, 2**30), changed(entry.arrays["node"], 1, -5)],
+        "row": [changed(row, -1, 2**30), changed(row, len(row) // 2, 2**30), changed(row, 0, 1), row[:-2], row // 2],
+        "boxes": [entry.arrays["boxes"][:-48], changed(entry.arrays["boxes"], box, 0.0)],
+        "rows": [rows[:-8], rows.astype(np.float64), rows.reshape(2, -1)]
+        + [changed(rows, record, as_float(bits)) for bits in (count, 2**30, -1, -(2**31))],
+    }
+    if trusted:
+        wrong["rows"] += [changed(rows, record + 8, as_float(kind)) for kind in (3, 7, 8, -1, 2**30)]
+    for name, others in wrong.items():
+        for other in others:
+            with pytest.raises((ValueError, KeyError, TypeError)):
+                check_grid({**entry.arrays, name: other}, entry.values, count)
+    for name in entry.arrays:
+        with pytest.raises(KeyError):
+            check_grid({n: a for n, a in entry.arrays.items() if n != name}, entry.values, count)
+    for name, others in {
+        "cells": [[0, 1, 1], [2**16, 2**16, 1], [1, 1], [8.0, 8, 8], None],
+        "low": [[0.0, float("nan"), 0.0], [1e30] * 3, [99.0] * 3, "low"],
+        "high": [[float("inf")] * 3, [-99.0] * 3],
+        "cell_offset": [[0.0, 0.0], [float("nan")] * 3],
+        "front": [0.5, float("nan"), None],
+        "half_patch": [-1.0, float("inf")],
+        "horizon": [-1.0, float("nan")] + ([0.0, 1e-30] if entry.values["front"] else []),
+        "cells_per_unit": [0.0, -1.0, 1e-30, float("inf")],
+        "records": [-1, 1.5, 2**40, True],
+        "patches": [1, None],
+    }.items():
+        for value in others:
+            with pytest.raises((ValueError, TypeError)):
+                check_grid(entry.arrays, {**entry.values, name: value}, count)
+        with pytest.raises(KeyError):
+            check_grid(entry.arrays, {n: v for n, v in entry.values.items() if n != name}, count)
+
+
+def short_box(entry: Entry) -> int:
+    """The place of a low side of a box that no block has."""
+    boxes = entry.arrays["boxes"].reshape(-1, 6, 8)
+    node, _, lane = np.argwhere(boxes[:, 0:1] > 1e29)[0]
+    return int(48 * node + lane)
+
+
+def test_maps_are_checked_in_every_field(cache: MapCache) -> None:
+    geometry, entry, _ = stored(search="linear")
+    frame, count = texel_frame(geometry.mesh, 32), len(geometry.faces)
+    arrays = entry.arrays
+    check_fragments(frame, count, arrays)
+    check_order(arrays)
+    start, depth, reference, balanced = (arrays[name] for name in ("start", "depth", "reference", "balanced"))
+    two = int(np.flatnonzero(np.diff(start) > 1)[0])
+    wrong = {
+        "start": [
+            start[:-1],
+            changed(start, 0, 1),
+            changed(start, -1, 2**31 - 1),
+            changed(start, 5, -(2**31)),
+            start * 2,
+        ],
+        "depth": [depth[:-1], changed(depth, 0, np.nan), depth.astype(np.float64), changed(depth, start[two], 1e9)],
+        "reference": [reference[1:], changed(reference, 3, -1), changed(reference, 3, 2 * count)],
+        "balanced": [balanced[1:], balanced + 2, balanced.astype(np.int32)],
+    }
+    for name, others in wrong.items():
+        for other in others:
+            with pytest.raises(ValueError):
+                check_fragments(frame, count, {**arrays, name: other})
+                check_order({**arrays, name: other})
+
+
+def test_a_crafted_file_is_made_anew(cache: MapCache, caplog: pytest.LogCaptureFixture) -> None:
+    geometry, entry, _ = stored()
+    key = cache.files()[0][0].stem
+    rays = rays_about(geometry.mesh, 200)
+    truth = peel_mesh(geometry, 32, quality="exact").trace(*rays)
+    for arrays, values in (
+        ({**entry.arrays, "row": changed(entry.arrays["row"], -1, 2**30)}, entry.values),
+        (entry.arrays, {}),
+        ({}, entry.values),
+    ):
+        caplog.clear()
+        cache.store(key, arrays, values)
+        again = peel_mesh(geometry, 32, quality="exact")
+        np.testing.assert_array_equal(again.trace(*rays).t, truth.t)
+        said = [record.getMessage() for record in caplog.records]
+        assert not again.from_cache and len(said) == 1 and "made anew" in said[0] and key in said[0]
+    assert peel_mesh(geometry, 32, quality="exact").grid and len(cache.files()) == 1
+
+
+@pytest.mark.parametrize("module", ["grid_build", "patches", "pieces", "doubts", "raster", "march_exact", "grid"])
+def test_every_constant_is_part_of_the_key(module: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = fingerprint("ldt")
+    found = importlib.import_module(f"ldtrefl.{module}")
+    own = [
+        name
+        for name, value in vars(found).items()
+        if name[0].isupper() and name.isupper() and isinstance(value, int | float | dict)
+    ]
+    assert own
+    for name in own:
+        value = getattr(found, name)
+        other = {**value, "finest": 1.0} if isinstance(value, dict) else value + 1 if abs(value) < 1e6 else 2 * value
+        with monkeypatch.context() as patch:
+            patch.setattr(found, name, other)
+            assert fingerprint("ldt") != before, name
+    assert fingerprint("ldt") == before
+
+
+def test_a_grid_of_other_constants_is_not_taken_for_current(cache: MapCache, monkeypatch: pytest.MonkeyPatch) -> None:
+    mesh = shapes.make("torus_knot", KNOT)
+    ldtrefl.peel(mesh.vertices, mesh.faces)
+    monkeypatch.setattr("ldtrefl.grid_build.CELLS_PER_ROOT", 0.05)
+    other = ldtrefl.peel(mesh.vertices, mesh.faces)
+    assert not other.from_cache and len(cache.files()) == 2
+
+
+def test_the_source_is_part_of_the_key(tmp_path: Path) -> None:
+    """C++ and the modules far below, but not the command line."""
+    copied = tmp_path / "ldtrefl"
+    shutil.copytree(Path(ldtrefl.__file__).parent, copied, ignore=shutil.ignore_patterns("__pycache__"))
+
+    def key_after(changed_file: str | None) -> str:
+        if changed_file is not None:
+            with (copied / changed_file).open("a") as file:
+                file.write("\n")
+        spec = importlib.util.spec_from_file_location("ldtrefl.fingerprint", copied / "fingerprint.py")
+        assert spec is not None and spec.loader is not None
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+        return str(module.fingerprint("ldt"))
+
+    keys = [key_after(name) for name in (None, "march_exact.h", "patches.py", "binning.py", "ldt.py")]
+    assert len(set(keys)) == len(keys) and keys[0] == fingerprint("ldt")
+    assert key_after("cli.py") == keys[-1]
+
+
+def test_the_folder_is_the_users_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = os.umask(0)
+    try:
+        cache = MapCache(tmp_path / "new" / "maps")
+        small_entry(cache)
+    finally:
+        os.umask(before)
+    assert stat.S_IMODE(cache.folder.stat().st_mode) == 0o700
+    assert stat.S_IMODE(cache.path("a" * 32).stat().st_mode) == 0o600
+    for mode in (0o770, 0o707, 0o1777):
+        cache.folder.chmod(mode)
+        with pytest.raises(ldtrefl.InputError, match="can be written by others"):
+            MapCache(cache.folder)
+    # The usual folder, made by an earlier version, is closed.
+    monkeypatch.setattr("platformdirs.user_cache_dir", lambda *_: str(cache.folder))
+    assert MapCache().folder == cache.folder and stat.S_IMODE(cache.folder.stat().st_mode) == 0o700
+    if os.geteuid() == 0:
+        os.chown(cache.folder, 12345, -1)
+        for folder in (None, cache.folder):
+            with pytest.raises(ldtrefl.InputError, match="belongs to another user"):
+                MapCache(folder)
+
+
+def test_what_is_no_file_of_the_user_is_ignored(cache: MapCache, caplog: pytest.LogCaptureFixture) -> None:
+    small_entry(cache)
+    path = cache.path("a" * 32)
+    kept = path.rename(cache.folder / "elsewhere")
+    for make in (
+        lambda: os.mkfifo(path),
+        lambda: path.symlink_to(kept),
+        path.mkdir,
+        lambda: (shutil.copy(kept, path), path.chmod(0o620)),
+        lambda: (shutil.copy(kept, path), os.truncate(path, 1 << 40)),
+        lambda: (shutil.copy(kept, path), os.chown(path, 12345 if os.geteuid() == 0 else -1, -1), path.chmod(0o666)),
+    ):
+        make()
+        caplog.clear()
+        assert cache.load("a" * 32) is None
+        assert len(caplog.records) == 1 and "\n" not in caplog.records[0].getMessage()
+        path.rmdir() if path.is_dir() and not path.is_symlink() else path.unlink()
+
+
+def npz(path: Path, **changes: object) -> Path:
+    """A saved layered depth texture with other arrays; None leaves one out."""
+    mesh = shapes.make("torus_knot", {"segments": [24, 6]})
+    ldtrefl.peel(mesh.vertices, mesh.faces, 16, search="linear").save(path)
+    with np.load(path) as good:
+        arrays = {name: good[name] for name in good.files}
+    arrays |= changes
+    np.savez(path, allow_pickle=True, **{name: array for name, array in arrays.items() if array is not None})
+    return path
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"start": None}, "start"),
+        ({"format": np.array([1, 2])}, "format is int64 of shape"),
+        ({"format": np.int64(9)}, "format 9, this version reads 1"),
+        ({"vertices": np.array([object()])}, "vertices is object"),
+        ({"vertices": np.full((175, 3), np.nan)}, "vertex 0 is not finite"),
+        ({"normals": np.full((175, 3), np.nan, np.float32)}, "not finite"),
+        ({"size": np.array([2**40, 1, 1])}, "texels, 1 to 4096 allowed"),
+        ({"size": np.array([0, 16, 16])}, "texels, 1 to 4096 allowed"),
+        ({"scale": np.float64("nan")}, "not finite"),
+        ({"scale": np.float64(0)}, "not finite"),
+        ({"offset": np.array([0, np.inf, 0])}, "not finite"),
+        ({"start": np.zeros(5, np.int32)}, "texels"),
+        ({"reference": np.zeros(5, np.int32)}, "fragments for other texels"),
+        ({"depth": np.zeros(5, np.float64)}, "depth is float64"),
+    ],
+)
+def test_wrong_saved_maps(tmp_path: Path, changes: dict[str, object], message: str) -> None:
+    path = npz(tmp_path / "a.npz", **changes)
+    with pytest.raises(ldtrefl.InputError, match=message) as caught:
+        ldtrefl.LayeredDepthTexture.load(path)
+    assert str(path) in str(caught.value)
+
+
+def test_saved_maps_that_are_no_archive(tmp_path: Path) -> None:
+    path = tmp_path / "a.npz"
+    os.mkfifo(path)
+    with pytest.raises(ldtrefl.InputError, match="not a plain file"):
+        ldtrefl.LayeredDepthTexture.load(path)
+    path.unlink()
+    for name in (tmp_path / "none.npz", tmp_path, "nul\0"):
+        with pytest.raises(ldtrefl.InputError, match="not a layered depth texture"):
+            ldtrefl.LayeredDepthTexture.load(name)
+    whole = npz(path).read_bytes()
+    for length in (*range(0, len(whole), 997), len(whole) - 1):
+        path.write_bytes(whole[:length])
+        with pytest.raises(ldtrefl.InputError):
+            ldtrefl.LayeredDepthTexture.load(path)
+
+
+def test_an_archive_that_unpacks_to_more_than_is_allowed(tmp_path: Path) -> None:
+    npz(tmp_path / "a.npz")
+    with np.load(tmp_path / "a.npz") as good:
+        arrays = {name: good[name] for name in good.files}
+    np.savez_compressed(tmp_path / "b.npz", **{**arrays, "depth": np.zeros(3 << 20, np.float32)})
+    assert (tmp_path / "b.npz").stat().st_size < 1 << 18
+    budget.set_memory_limit(8 << 20)
+    try:
+        with pytest.raises(ldtrefl.InputError, match=r"needs 12\.\d MiB, allowed are 8\.0 MiB"):
+            ldtrefl.LayeredDepthTexture.load(tmp_path / "b.npz")
+        # An array that says that it is longer than what is packed.
+        with zipfile.ZipFile(tmp_path / "a.npz") as archive, zipfile.ZipFile(tmp_path / "c.npz", "w") as crafted:
+            for name in archive.namelist():
+                data = archive.read(name)
+                if name == "depth.npy":
+                    data = (
+                        b"\x93NUMPY\1\0\x76\0" + b"{'descr': '<f4', 'fortran_order': False, 'shape': (1073741824,), }"
+                    )
+                    data = data.ljust(127) + b"\n"
+                crafted.writestr(name, data)
+        with pytest.raises(ldtrefl.InputError, match="depth is not as long as it says"):
+            ldtrefl.LayeredDepthTexture.load(tmp_path / "c.npz")
+    finally:
+        budget.set_memory_limit()

@@ -24,6 +24,7 @@ BOTTOM_TO_TOP = (
     "python_pool",
     "crew",
     "launch",
+    "pillow_limit",
     "image",
     "bulk",
     "pillow_pictures",

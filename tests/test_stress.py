@@ -16,7 +16,8 @@ from stress_cases.pictures import Held, Reference, judge_frame, shows_enough, su
 import ldtrefl
 from ldtrefl import shapes
 
-IN_THIS_PROCESS = [name for name in CASES if name not in ("files", "kills")]
+FORKING = ("files", "kills", "cache_files")
+IN_THIS_PROCESS = [name for name in CASES if name not in FORKING]
 
 
 @pytest.mark.parametrize("name", IN_THIS_PROCESS)
@@ -31,7 +32,7 @@ def test_case_keeps_its_limits(name: str) -> None:
 def test_files_and_kills_keep_their_limits() -> None:
     """These fork, so they get a process of their own, in which no threads run."""
     tool = Path(__file__).parent.parent / "tools" / "stress.py"
-    command = [sys.executable, str(tool), "--quick", "--only", "files", "--only", "kills"]
+    command = [sys.executable, str(tool), "--quick", *(word for name in FORKING for word in ("--only", name))]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
 

@@ -48,6 +48,7 @@ CASES: dict[str, tuple[Size, Size]] = {  # name of the module -> full and quick 
     "files": (Size(0, 10_000), Size(0, 80)),
     "kills": (Size(0, 64), Size(0, 16)),
     "bounds": (Size(0, 1), Size(0, 7)),
+    "cache_files": (Size(0, 150), Size(0, 12)),
 }
 
 
