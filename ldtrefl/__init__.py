@@ -6,7 +6,7 @@ The pipeline, one module a stage:
       -> G-buffer: what the camera sees (gbuffer, raster)
       -> a method (methods/): its tracer answers reflected rays (trace), whose life is written once (reflect)
            ldt: cull (cull), as fine as needed (resolution), peel on first need (ldt: peel -> fragments, patches, doubts
-                -> grid; kept by cache), march (march: march_exact, march_linear)
+                -> grid; kept by cache, checked by grid_check), march (march: march_exact, march_linear)
            bvh: the ground truth (raycast)
       -> what stays from frame to frame (kept); what may be left out (skips)
       -> shade, the same functions for all (shade) -> composite (render) -> image (image), compared (metrics)

@@ -27,6 +27,7 @@ from typing import Any
 
 import numpy as np
 import OpenImageIO as oiio
+import xxhash
 
 from ldtrefl import budget
 from ldtrefl.errors import InputError
@@ -243,7 +244,8 @@ def save_image(path: str | Path, image: np.ndarray) -> None:
         raise InputError(f"{path}: an image is (height, width, 3), got {image.shape}")
     is_png = path.suffix.lower() == ".png"
     with written_whole(path) as scratch, caught_stderr():
-        if not (_written(scratch, image, is_png) and _reads_back(scratch, image, is_png)):
+        digest = _written(scratch, image, is_png)
+        if digest is None or digest != _digest_of(scratch, image.shape, is_png):
             raise InputError(f"{path}: could not be written ({oiio.geterror() or 'is the disk full?'})")
 
 
@@ -252,31 +254,39 @@ def _encoded(rows: np.ndarray, is_png: bool) -> np.ndarray:
     return np.round(srgb_from_linear(rows) * 255.0).astype(np.uint8) if is_png else np.ascontiguousarray(rows)
 
 
-def _written(path: Path, image: np.ndarray, is_png: bool) -> bool:
-    """Write a file; whether nothing was said against it."""
+def _written(path: Path, image: np.ndarray, is_png: bool) -> bytes | None:
+    """Write a file; a hash of what should stand in it, None if something was said against it."""
     height, width, channels = image.shape
     spec = oiio.ImageSpec(width, height, channels, oiio.UINT8 if is_png else oiio.FLOAT)
     spec.attribute("oiio:ColorSpace", "sRGB" if is_png else "linear")
     writer = oiio.ImageOutput.create(str(path))
     if not (writer and writer.open(str(path), spec)):
-        return False
+        return None
+    digest = xxhash.xxh3_128()
+    is_good = True
     step = max(1, BYTES_AT_ONCE // image[0].nbytes)
-    parts = (slice(top, min(top + step, height)) for top in range(0, height, step))
-    good = all(writer.write_scanlines(part.start, part.stop, 0, _encoded(image[part], is_png)) for part in parts)
-    return bool(writer.close()) and good
+    for top in range(0, height, step):
+        rows = _encoded(image[top : top + step], is_png)
+        digest.update(rows.data)
+        is_good = is_good and writer.write_scanlines(top, top + len(rows), 0, rows)
+    return digest.digest() if writer.close() and is_good else None
 
 
-def _reads_back(path: Path, image: np.ndarray, is_png: bool) -> bool:
-    """Whether a file holds every bit of an image."""
+def _digest_of(path: Path, shape: tuple[int, ...], is_png: bool) -> bytes | None:
+    """The same hash of what does stand in a file, None if it is not an image of this shape."""
     reader = oiio.ImageInput.open(str(path))
     if reader is None:
-        return False
+        return None
     try:
-        size = (reader.spec().height, reader.spec().width, reader.spec().nchannels)
-        return size == image.shape and all(
-            rows is not None and rows.tobytes() == _encoded(image[top : top + len(rows)], is_png).tobytes()
-            for top, rows in _row_by_row(reader, 0, 3, oiio.UINT8 if is_png else oiio.FLOAT)
-        )
+        spec = reader.spec()
+        if (spec.height, spec.width, spec.nchannels) != shape:
+            return None
+        digest = xxhash.xxh3_128()
+        for _, rows in _row_by_row(reader, 0, 3, oiio.UINT8 if is_png else oiio.FLOAT):
+            if rows is None:
+                return None
+            digest.update(np.ascontiguousarray(rows).data)
+        return digest.digest()
     finally:
         reader.close()
 

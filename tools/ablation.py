@@ -26,6 +26,7 @@ from timing import in_turn
 
 import ldtrefl
 from ldtrefl import launch, skips
+from ldtrefl.errors import InputError
 from ldtrefl.files import written_whole
 from ldtrefl.reflect import no_shadows, shade_gbuffer
 from ldtrefl.render import Frame, Renderer
@@ -313,4 +314,7 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except InputError as error:
+        sys.exit(f"ablation.py: {error}")

@@ -16,6 +16,7 @@ import argparse
 import json
 import os
 import platform
+import sys
 from pathlib import Path
 
 import warp as wp
@@ -27,6 +28,7 @@ from benchmark_parts.report import draw_plots, reading
 from benchmark_parts.threads import thread_scaling
 
 import ldtrefl
+from ldtrefl.errors import InputError
 from ldtrefl.files import written_whole
 
 
@@ -58,4 +60,7 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except InputError as error:
+        sys.exit(f"benchmark.py: {error}")

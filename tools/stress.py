@@ -21,6 +21,7 @@ from types import ModuleType
 
 from stress_cases.judge import Outcome, as_dict
 
+from ldtrefl.errors import InputError
 from ldtrefl.files import written_whole
 
 
@@ -120,4 +121,7 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    try:
+        sys.exit(main())
+    except InputError as error:
+        sys.exit(f"stress.py: {error}")
