@@ -116,14 +116,17 @@ def _read(path: Path) -> np.ndarray:
         raise InputError(f"{path}: no such picture")
     _ask_for_unpacking(path)
     with caught_stderr():  # the formats' own libraries print what they find
-        reader = oiio.ImageInput.open(str(path), _AS_STORED)
-        if reader is None:
-            oiio.geterror()
-            raise _unreadable(path)
         try:
-            return _read_colors(reader, path)
-        finally:
-            reader.close()
+            reader = oiio.ImageInput.open(str(path), _AS_STORED)
+            if reader is None:
+                oiio.geterror()
+                raise _unreadable(path)
+            try:
+                return _read_colors(reader, path)
+            finally:
+                reader.close()
+        except UnicodeDecodeError as error:  # a damaged name, or a message about one
+            raise _unreadable(path) from error
 
 
 def _ask_for_unpacking(path: Path) -> None:

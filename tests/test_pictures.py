@@ -18,6 +18,7 @@ import ldtrefl
 from ldtrefl import InputError, budget, load_image, shapes
 from ldtrefl.image import linear_from_srgb, stored_picture
 from ldtrefl.mesh import Mesh, Part
+from ldtrefl.pillow_pictures import stored_from_pillow
 from ldtrefl.scene import Camera, Environment, Material, Object, Scene
 
 COLOR = (200, 100, 50)
@@ -152,6 +153,27 @@ def test_channels_of_an_exr(tmp_path: Path, names: tuple[str, ...], expected: tu
     np.testing.assert_array_equal(load_image(path), np.float32(expected) * ramp)
 
 
+@pytest.mark.parametrize("name", ["a.exr", "a.png", "a.tif", "a.hdr", "a.jpg"])
+def test_a_changed_byte_of_a_header(tmp_path: Path, name: str) -> None:
+    """A picture or a line, whatever the byte is; in names and messages it may be no letter."""
+    path = tmp_path / name
+    if name == "a.jpg":
+        Image.new("RGB", (6, 4), COLOR).save(path)
+    else:
+        write(path, np.full((4, 6, 3), 100), oiio.UINT8 if name == "a.png" else oiio.FLOAT)
+    whole = path.read_bytes()
+    refused = 0
+    for place in range(min(len(whole), 240)):
+        for value in (0xE7, 0xFF):
+            path.write_bytes(whole[:place] + bytes([value]) + whole[place + 1 :])
+            try:
+                assert load_image(path).shape[2] == 3
+            except InputError as error:
+                assert str(path) in str(error)
+                refused += 1
+    assert refused
+
+
 def test_what_is_no_number_is_refused_and_what_is_below_zero_is_kept(tmp_path: Path) -> None:
     path = write(tmp_path / "a.exr", np.full((4, 6, 3), -2.0), oiio.FLOAT)
     np.testing.assert_array_equal(load_image(path), np.full((4, 6, 3), -2.0, np.float32))
@@ -264,6 +286,14 @@ def test_textures_of_a_glb(tmp_path: Path, mode: str, monkeypatch: pytest.Monkey
     monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", None)
     np.testing.assert_array_equal(texture, np.asarray(picture.convert("RGB")))
     assert Image.MAX_IMAGE_PIXELS is None
+
+
+def test_sixteen_bits_of_a_mesh_are_scaled_and_the_same_picture_is_one(tmp_path: Path) -> None:
+    values = np.arange(24, dtype=np.uint16).reshape(4, 6) * 2700 + 11
+    Image.fromarray(values).save(tmp_path / "a.png")
+    read = [stored_from_pillow(Image.open(tmp_path / "a.png")) for _ in range(2)]
+    assert read[0] is read[1] and not read[0].flags.writeable
+    np.testing.assert_array_equal(read[0], load_image(tmp_path / "a.png"))
 
 
 def test_a_glb_of_large_textures_is_asked_for_first(tmp_path: Path, small_limit: int) -> None:
