@@ -16,7 +16,8 @@ from ldtrefl.errors import InputError
 from ldtrefl.image import load_image, save_image
 from ldtrefl.launch import Stats, set_threads
 from ldtrefl.ldt import LayeredDepthTexture, peel
-from ldtrefl.mesh import Mesh, load_mesh
+from ldtrefl.mesh import Mesh
+from ldtrefl.mesh_files import load_mesh
 from ldtrefl.raycast import Raycaster
 from ldtrefl.render import Frame, Renderer, render
 from ldtrefl.scene import (

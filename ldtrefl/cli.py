@@ -29,7 +29,8 @@ from ldtrefl.files import writable_folder, written_whole
 from ldtrefl.image import check_writable, difference_image, save_image
 from ldtrefl.layers import draw_layers
 from ldtrefl.ldt import DEFAULT_RESOLUTION, peel_mesh
-from ldtrefl.mesh import Mesh, load_mesh
+from ldtrefl.mesh import Mesh
+from ldtrefl.mesh_files import load_mesh
 from ldtrefl.methods import all_methods, find_method
 from ldtrefl.native import log_on_stderr
 from ldtrefl.render import Frame, Renderer

@@ -1,4 +1,4 @@
-"""Triangle meshes: checked, read from files, brought to the unit cube.
+"""Triangle meshes: checked, and brought to the unit cube.
 
 Vertices are ``(n, 3)`` float64 in the object's own coordinates, faces ``(m, 3)`` int32 in the order of the file: a
 triangle's number means the same to the mesh, the ray caster and the layered depth texture.
@@ -8,16 +8,13 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-import trimesh
 
 from ldtrefl.bulk import stray_triangles
 from ldtrefl.errors import InputError
-from ldtrefl.pillow_limit import no_pixel_limit
-from ldtrefl.pillow_pictures import picture_of, stored_from_pillow, take_pictures
+from ldtrefl.normals import vertex_normals
 
 MAX_TRIANGLES = 1 << 30
 """Triangle numbers are int32 and a fragment keeps one bit of it for the facing."""
@@ -84,7 +81,7 @@ class Mesh:
     @functools.cached_property
     def normals(self) -> np.ndarray:
         """(n, 3) float32 shading normals; made from the faces, when they are first asked for, if none were given."""
-        return smooth_normals(self.vertices, self.faces)
+        return vertex_normals(self.vertices, self.faces)
 
     @functools.cached_property
     def is_used(self) -> np.ndarray:
@@ -149,107 +146,3 @@ def _indices(values: Any) -> np.ndarray:
     except (TypeError, ValueError, OverflowError) as error:
         raise InputError("faces must be whole numbers of shape (m, 3)") from error
     return _array(array, np.int64, 3, "faces")
-
-
-def smooth_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """(n, 3) float32 vertex normals weighted by angle, the same at vertices of one position. Zero where undefined."""
-    _, first, inverse = np.unique(vertices, axis=0, return_index=True, return_inverse=True)
-    inverse = inverse.reshape(-1)
-    centre, size = vertices.mean(axis=0), float(np.ptp(vertices, axis=0).max()) or 1.0
-    welded = trimesh.Trimesh((vertices[first] - centre) / size, inverse[faces], process=False, validate=False)
-    return np.nan_to_num(welded.vertex_normals[inverse]).astype(np.float32)
-
-
-def load_mesh(path: str | Path) -> Mesh:
-    """Read any file that trimesh reads; materials' base colours and textures come along.
-
-    The same file is read once, and again only when it has changed.
-
-    Raises:
-        InputError: the file is missing, unreadable or holds no sound mesh; the message names it.
-    """
-    path = Path(path)
-    try:
-        stat = path.stat()
-    except OSError as error:
-        raise InputError(f"{path}: no such mesh ({error.strerror})") from error
-    with no_pixel_limit():
-        return _load_mesh(str(path.resolve()), stat.st_mtime_ns, stat.st_size)
-
-
-@functools.lru_cache(maxsize=32)
-def _load_mesh(path: str, _modified: int, _size: int) -> Mesh:
-    if Path(path).suffix.lower().lstrip(".") not in trimesh.available_formats():
-        kinds = ", ".join(sorted(trimesh.available_formats()))
-        raise InputError(f"{path}: not a kind of mesh file that can be read (allowed: {kinds})")
-    try:
-        loaded = trimesh.load_scene(path, process=False, maintain_order=True)
-        take_pictures([getattr(geometry.visual, "material", None) for geometry in loaded.geometry.values()])
-        pieces = [piece for piece in loaded.dump() if isinstance(piece, trimesh.Trimesh) and len(piece.faces)]
-    except InputError as error:
-        raise error.within(path) from None
-    except Exception as error:  # whatever a damaged file provokes in a reader is the file's fault
-        raise InputError(f"{path}: not a mesh that can be read ({type(error).__name__}: {error})") from error
-    if not pieces:
-        raise InputError(f"{path}: the mesh has no triangles")
-    try:
-        return _joined(pieces)
-    except InputError as error:
-        raise error.within(path) from None
-
-
-def _joined(pieces: list[trimesh.Trimesh]) -> Mesh:
-    if len(pieces) == 1:
-        uv = _uvs(pieces[0])
-        color, texture = _look(pieces[0])
-        part = Part(0, color, texture if uv is not None else None)
-        return Mesh(pieces[0].vertices, pieces[0].faces, _stored_normals(pieces[0]), uv, (part,))
-    with_uvs = any(_uvs(piece) is not None for piece in pieces)
-    vertices, faces, normals, uvs, parts = [], [], [], [], []
-    vertex_count = triangle_count = 0
-    for piece in pieces:
-        checked = Mesh(piece.vertices, piece.faces, _stored_normals(piece))
-        uv = _uvs(piece)
-        vertices.append(checked.vertices)
-        faces.append(checked.faces + vertex_count)
-        normals.append(checked.normals)
-        uvs.append(np.zeros((len(checked.vertices), 2), np.float32) if uv is None else uv)
-        color, texture = _look(piece)
-        parts.append(Part(triangle_count, color, texture if uv is not None else None))
-        vertex_count += len(checked.vertices)
-        triangle_count += len(checked.faces)
-    return Mesh(
-        np.concatenate(vertices),
-        np.concatenate(faces),
-        np.concatenate(normals),
-        np.concatenate(uvs) if with_uvs else None,
-        tuple(parts),
-    )
-
-
-def _stored_normals(piece: trimesh.Trimesh) -> np.ndarray | None:
-    """The normals that the file holds, if it holds any."""
-    stored = piece._cache.cache.get("vertex_normals")
-    return None if stored is None or np.shape(stored) != np.shape(piece.vertices) else np.asarray(stored)
-
-
-def _uvs(piece: trimesh.Trimesh) -> np.ndarray | None:
-    uv = getattr(piece.visual, "uv", None)
-    if uv is None or np.shape(uv) != (len(piece.vertices), 2) or not np.isfinite(uv).all():
-        return None
-    return np.asarray(uv, np.float32)
-
-
-def _look(piece: trimesh.Trimesh) -> tuple[tuple[float, float, float], np.ndarray | None]:
-    """A piece's base colour, linear, and its texture as it is stored (glTF: factors are linear, textures sRGB)."""
-    material = getattr(piece.visual, "material", None)
-    if material is None:
-        return (1.0, 1.0, 1.0), None
-    factor = getattr(material, "baseColorFactor", None)
-    color = (1.0, 1.0, 1.0)
-    if factor is not None:
-        scale = 255.0 if np.asarray(factor).dtype.kind in "iu" else 1.0
-        r, g, b = (float(channel) / scale for channel in np.asarray(factor)[:3])
-        color = (r, g, b)
-    picture = picture_of(material)
-    return color, None if picture is None else stored_from_pillow(picture)

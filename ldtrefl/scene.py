@@ -22,7 +22,8 @@ from pydantic.dataclasses import dataclass
 from ldtrefl import shapes
 from ldtrefl.errors import InputError, first_fault, unknown_name
 from ldtrefl.image import stored_picture
-from ldtrefl.mesh import Mesh, load_mesh
+from ldtrefl.mesh import Mesh
+from ldtrefl.mesh_files import load_mesh
 
 MESH_PATH_VARIABLE = "LDTREFL_MESH_PATH"
 MAX_SIDE = 16384
