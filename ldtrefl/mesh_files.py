@@ -75,7 +75,8 @@ def _load_mesh(path: str, _modified: int, _size: int) -> Mesh:
     if archive_kind(path) is None and Path(path).suffix.lower().lstrip(".") not in mesh_formats():
         kinds = ", ".join(sorted([*mesh_formats(), *(ending.lstrip(".") for ending in ARCHIVES)]))
         raise InputError(f"{path}: not a kind of mesh file that can be read (allowed: {kinds})")
-    with budget.account():
+    # What NumPy would warn of ends in a check of the mesh.
+    with budget.account(), np.errstate(all="ignore"):
         try:
             pieces: list[_Piece] = []
             asked = 0.0
