@@ -2,7 +2,7 @@
 
 The pipeline, one module a stage:
 
-    scene file -> Scene (scene, shapes, mesh) -> arrays on the device (device_scene)
+    scene file -> Scene (scene, shapes, mesh, mesh_files, normals) -> arrays on the device (device_scene)
       -> G-buffer: what the camera sees (gbuffer, raster)
       -> a method (methods/): its tracer answers reflected rays (trace), whose life is written once (reflect)
            ldt: cull (cull), as fine as needed (resolution), peel on first need (ldt: peel -> fragments, patches, doubts

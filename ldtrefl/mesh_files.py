@@ -100,6 +100,8 @@ def _load_mesh(path: str, _modified: int, _size: int) -> Mesh:
 def _pieces(data: bytes, kind: str, beside: Any) -> list[_Piece]:
     """The pieces of a mesh file, in its own order, where its nodes place them."""
     options = {"fix_texture": False} if kind == "ply" else {}
+    if kind in ("obj", "off"):
+        data = _as_utf8(data)
     if has_polygons(data, kind):
         data = in_triangles(data, kind)
     read = mesh_loaders[kind](file_obj=io.BytesIO(data), file_type=kind, resolver=beside, metadata=None, **options)
@@ -113,6 +115,16 @@ def _pieces(data: bytes, kind: str, beside: Any) -> list[_Piece]:
     own = {name: piece for name, entry in geometry.items() if (piece := _piece(entry)) is not None}
     placed = _placed([_node(node) for node in nodes], read.get("base_frame", "world"))
     return [_moved(own[name], matrix) for name, matrix in placed if name in own]
+
+
+def _as_utf8(data: bytes) -> bytes:
+    """A text file without a byte order mark; what is not UTF-8, as some comments, is taken for Latin-1."""
+    data = data.removeprefix(b"\xef\xbb\xbf")
+    try:
+        data.decode()
+    except UnicodeDecodeError:
+        return data.decode("latin-1").encode()
+    return data
 
 
 def _piece(entry: dict[str, Any]) -> _Piece | None:

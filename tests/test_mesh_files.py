@@ -91,6 +91,13 @@ def test_relative_numbers_of_an_obj_count_from_where_they_stand(tmp_path: Path) 
     np.testing.assert_array_equal(mesh.vertices[mesh.faces][:, :, 2], [[0] * 3, [1] * 3, [2] * 3])
 
 
+def test_an_obj_may_have_a_mark_and_comments_of_any_letters(tmp_path: Path) -> None:
+    text = "# caf\u00e9\r\nv 0 0 0\r\nv 1 0 0\r\nv 0 1 0\r\nv 1 1 0\r\nf 1 2 4 3 # d\u00e9j\u00e0 vu\r\n"
+    for encoding in ("latin-1", "utf-8", "utf-8-sig"):
+        (tmp_path / "a.obj").write_bytes(text.encode(encoding))
+        assert len(ldtrefl.load_mesh(tmp_path / "a.obj").faces) == 2
+
+
 def test_nodes_place_normals_and_winding(tmp_path: Path) -> None:
     """A stretched and turned copy, and a mirrored one inside a moved node: the sphere's normals follow its surface."""
     ball = trimesh.creation.icosphere(3)
