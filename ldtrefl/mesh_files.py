@@ -81,7 +81,7 @@ def _load_mesh(path: str, _modified: int, _size: int) -> Mesh:
             pieces: list[_Piece] = []
             asked = 0.0
             for data, kind, beside in mesh_files(path):
-                needed = reading_bytes(data, kind, beside)
+                needed = reading_bytes(data, kind)
                 budget.take(needed, f"reading it as {kind}")
                 pieces += _pieces(data, kind, beside)
                 asked += needed

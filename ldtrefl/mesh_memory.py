@@ -17,6 +17,7 @@ BYTES_PER_VERTEX = 160.0
 """To join, weld and smooth pieces, what the mesh itself takes included."""
 
 BYTES_PER_TRIANGLE = 90.0
+"""The same for a triangle."""
 
 TEXT = 5.0
 """Bytes per byte of a text file, apart from its words."""
@@ -30,22 +31,20 @@ BINARY = {"stl": 5.0, "ply": 5.0, "glb": 4.0}
 """Bytes per byte of a binary file."""
 
 BINARY_WITH_POLYGONS = 30.0
+"""The same for a PLY file of polygons."""
 
 OTHER = 40.0
 """Bytes per byte of what else there is: XML, for the most part."""
 
 JSON = 60.0
-"""Bytes per byte of the JSON in a glTF file, and per byte of pieces that a reader makes objects of."""
+"""Bytes per byte of the JSON in a glTF file: its nodes and primitives become objects."""
 
 COMPONENT_BYTES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
 COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 
 
-def reading_bytes(data: bytes, kind: str, beside: Any) -> float:
-    """Bytes that it takes to read a mesh file of some kind ('obj', 'glb'), besides its own.
-
-    ``beside`` is trimesh's resolver for the files that it names.
-    """
+def reading_bytes(data: bytes, kind: str) -> float:
+    """Bytes that it takes to read a mesh file of some kind ('obj', 'glb'), besides its own."""
     if kind in ("glb", "gltf"):
         return _gltf_bytes(data, kind)
     if kind in ("3mf", "3dxml", "zae"):

@@ -21,8 +21,9 @@ import warp as wp
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from ldtrefl import launch
+from ldtrefl import budget, launch
 from ldtrefl.binning import bin_items
+from ldtrefl.errors import InputError
 from ldtrefl.welding import first_of_equals
 
 SMALLEST_SINE = wp.constant(wp.float64(1e-14))
@@ -39,6 +40,12 @@ CROWDED = wp.constant(2)
 
 SMALLEST_EXPONENT = -1000
 """Of the largest coordinate: what is smaller is not scaled up to 1, which would overflow."""
+
+MOST_CORNERS = (1 << 31) - 1
+"""Corners are numbered in int32."""
+
+BYTES_PER_CANDIDATE = 300
+"""Memory for each triangle that may have a mirror image, as measured."""
 
 BLOCK = 1 << 17
 """Corners whose sides are found at a time."""
@@ -129,6 +136,9 @@ def vertex_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """(n, 3) float32 unit normals of (n, 3) float64 vertices with (m, 3) int32 faces.
 
     Zero where undefined: where no triangle with an area meets, and where one vertex serves several sides.
+
+    Raises:
+        InputError: too many triangles.
     """
     found = _smoothed(vertices, faces, None)
     used = faces.reshape(-1)[found.corners]
@@ -152,6 +162,9 @@ def split_by_side(
         sources: (n + k,) int64, which vertex each of the new ones is: 0 to n - 1 and then the doubled ones.
         faces: (m, 3) int32, the same triangles in the same order.
         normals: (n + k, 3) float32.
+
+    Raises:
+        InputError: too many triangles, or more memory for their sides than is allowed.
     """
     found = _smoothed(vertices, faces, pieces)
     sources = np.arange(len(vertices))
@@ -171,6 +184,11 @@ def split_by_side(
 
 
 def _smoothed(vertices: np.ndarray, faces: np.ndarray, pieces: np.ndarray | None) -> _Smoothed:
+    corner_count = max(3 * len(faces), 2 * len(vertices))
+    if corner_count > MOST_CORNERS:
+        raise InputError(
+            f"{len(faces)} triangles are too many for smooth normals, at most {MOST_CORNERS // 3} are allowed"
+        )
     device = launch.resolve_device("cpu")
     largest = max(float(vertices.max()), -float(vertices.min()))
     # By a power of two, so that nothing is rounded.
@@ -251,6 +269,7 @@ def _has_mirror_image(places: np.ndarray, is_suspect: np.ndarray) -> np.ndarray:
     """(m,) bool: triangles whose three places another triangle has the other way round."""
     result = np.zeros(len(places), bool)
     candidates = np.flatnonzero(is_suspect[places].all(axis=1))
+    budget.take(BYTES_PER_CANDIDATE * len(candidates), "the sides of triangles that were modelled twice")
     corners = places[candidates]
     distinct = (corners[:, 0] != corners[:, 1]) & (corners[:, 1] != corners[:, 2]) & (corners[:, 2] != corners[:, 0])
     candidates, corners = candidates[distinct], corners[distinct]
