@@ -8,6 +8,7 @@ slicing, so the bits do not depend on the number of threads.
 
 from __future__ import annotations
 
+import functools
 import operator
 import os
 import threading
@@ -43,6 +44,7 @@ class _State:
     threads: int = os.cpu_count() or 1
     crews: dict[int, Crew | Pool] = field(default_factory=dict)  # by number of threads
     lock: threading.Lock = field(default_factory=threading.Lock)  # to make a crew
+    defining: threading.RLock = field(default_factory=threading.RLock)  # to define kernels
 
 
 class _Watch(threading.local):
@@ -60,6 +62,7 @@ def _after_fork_in_child() -> None:
     # Threads do not exist in a forked process: it makes its own at its first launch.
     _state.crews.clear()
     _state.lock = threading.Lock()
+    _state.defining = threading.RLock()
 
 
 os.register_at_fork(after_in_child=_after_fork_in_child)
@@ -69,6 +72,21 @@ def kernel(function: Callable[..., None]) -> wp.Kernel:
     """Make ``function`` a Warp kernel: a module of its own, forward only (backward passes double compile time)."""
     made = wp.kernel(function, module="unique", enable_backward=False)
     KERNELS.append(made)
+    return made
+
+
+def once(make: Callable[..., Any]) -> Callable[..., Any]:
+    """A function that makes kernels, or what they are made of: for equal arguments once, whichever thread asks first.
+
+    Two kernels of one name would share a module of Warp's, and the second would have the first's code unloaded.
+    """
+    cached = functools.cache(make)
+
+    @functools.wraps(make)
+    def made(*arguments: Any) -> Any:
+        with _state.defining:
+            return cached(*arguments)
+
     return made
 
 

@@ -7,7 +7,6 @@ above it (bounces, shadows, shading, counters) exists once for the layered depth
 A tracer works in the object's unit space, with unit directions. A miss is ``t = +inf`` and triangle -1.
 """
 
-import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -93,7 +92,7 @@ def array_of_views(views: Sequence[Any], view: Any, device: wp.Device) -> wp.arr
     return warp_abi.array_of_structs(views, view, device)
 
 
-@functools.cache
+@launch.once
 def closest_hit_of(tracer: Tracer) -> Any:
     """``closest(views, index, start, way, t_max) -> Hit`` for rays from anywhere: ``start`` float64, ``way`` a unit
     vector, both in the unit space of object ``index``."""
@@ -120,7 +119,7 @@ def closest_hit_of(tracer: Tracer) -> Any:
     return closest
 
 
-@functools.cache
+@launch.once
 def occluded_of(tracer: Tracer) -> Any:
     """``is_blocked(views, index, start, way, t_max, outwards) -> bool`` for rays from anywhere, see
     :func:`closest_hit_of`."""
@@ -139,7 +138,7 @@ def occluded_of(tracer: Tracer) -> Any:
     return is_blocked
 
 
-@functools.cache
+@launch.once
 def batch_kernel(tracer: Tracer) -> wp.Kernel:
     """The kernel that traces rays given in object space."""
     closest = closest_hit_of(tracer)
