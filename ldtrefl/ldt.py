@@ -140,18 +140,18 @@ class LayeredDepthTexture:
 
     @property
     def start(self) -> wp.array:
-        """(texels + 1,) int32: first fragment of each texel, the three axes' maps in a row."""
-        return self._maps.start
+        """(texels + 1,) int32: first fragment of each texel, the three axes' maps in a row; a copy."""
+        return wp.clone(self._maps.start)
 
     @property
     def depth(self) -> wp.array:
-        """(fragments,) float32, texels along the map's axis, sorted in each texel."""
-        return self._maps.depth
+        """(fragments,) float32, texels along the map's axis, sorted in each texel; a copy."""
+        return wp.clone(self._maps.depth)
 
     @property
     def reference(self) -> wp.array:
-        """(fragments,) int32: triangle times 2, plus 1 if it faces up the axis."""
-        return self._maps.reference
+        """(fragments,) int32: triangle times 2, plus 1 if it faces up the axis; a copy."""
+        return wp.clone(self._maps.reference)
 
     @property
     def resolution(self) -> int:
@@ -179,13 +179,13 @@ class LayeredDepthTexture:
         """(rows, columns) int32: fragments per texel of the map of ``axis``."""
         rows, columns = self.frame.map_shape(axis)
         first = self.frame.first_texels
-        return np.diff(self.start.numpy()[first[axis] : first[axis + 1] + 1]).reshape(rows, columns)
+        return np.diff(self._maps.start.numpy()[first[axis] : first[axis + 1] + 1]).reshape(rows, columns)
 
     def layers(self) -> dict[str, int]:
         """Per face, the most surfaces that face it over one texel: the layers that depth peeling would draw."""
-        starts = self.start.numpy()
+        starts = self._maps.start.numpy()
         first = self.frame.first_texels
-        upwards = np.concatenate([[0], np.cumsum(self.reference.numpy() & 1)])
+        upwards = np.concatenate([[0], np.cumsum(self._maps.reference.numpy() & 1)])
         rising = upwards[starts[1:]] - upwards[starts[:-1]]
         total = np.diff(starts)
         layers = {}
@@ -261,9 +261,9 @@ class LayeredDepthTexture:
             "size": np.array(self.frame.size),
             "scale": np.float64(self.frame.scale),
             "offset": np.array(self.frame.offset),
-            "start": self.start.numpy(),
-            "depth": self.depth.numpy(),
-            "reference": self.reference.numpy(),
+            "start": self._maps.start.numpy(),
+            "depth": self._maps.depth.numpy(),
+            "reference": self._maps.reference.numpy(),
         }
         with written_whole(path) as scratch, scratch.open("wb") as file:
             np.savez(file, **arrays)

@@ -36,7 +36,7 @@ class Part:
 
 
 class Mesh:
-    """A checked triangle mesh; not to be changed once made.
+    """A checked triangle mesh. Its arrays are copies of those given, and read-only: what is made of them is kept.
 
     Raises:
         InputError: no triangles, an index out of range, a vertex that is not finite, or shapes that do not fit.
@@ -67,7 +67,7 @@ class Mesh:
         if len(wrong):
             first = int(wrong[0])
             raise InputError(f"vertex {first} is not finite or too large: {self.vertices[first].tolist()}")
-        self.faces = checked.astype(np.int32)
+        self.faces = checked.astype(np.int32, copy=False)
         """(m, 3) int32."""
         if normals is not None:
             self.normals = _array(normals, np.float32, 3, "normals")
@@ -77,24 +77,27 @@ class Mesh:
         for name, values in (("normals", None if normals is None else self.normals), ("uvs", self.uvs)):
             if values is not None and len(values) != len(self.vertices):
                 raise InputError(f"{len(values)} {name} for {len(self.vertices)} vertices")
+        for array in (self.vertices, self.faces, None if normals is None else self.normals, self.uvs):
+            if array is not None:
+                array.flags.writeable = False
 
     @functools.cached_property
     def normals(self) -> np.ndarray:
         """(n, 3) float32 shading normals; made from the faces, when they are first asked for, if none were given."""
-        return vertex_normals(self.vertices, self.faces)
+        return _read_only(vertex_normals(self.vertices, self.faces))
 
     @functools.cached_property
     def is_used(self) -> np.ndarray:
         """(n,) bool: vertices that a triangle has."""
         used = np.zeros(len(self.vertices), bool)
         used[self.faces] = True
-        return used
+        return _read_only(used)
 
     @functools.cached_property
     def bounds(self) -> np.ndarray:
         """(2, 3) float64: the lowest and highest corner of the triangles' box (unused vertices left out)."""
         used = self.vertices[self.is_used]
-        return np.stack([used.min(axis=0), used.max(axis=0)])
+        return _read_only(np.stack([used.min(axis=0), used.max(axis=0)]))
 
     @functools.cached_property
     def strays(self) -> np.ndarray:
@@ -114,18 +117,24 @@ class Mesh:
         """``(centre, half)``: ``(v - centre) / half`` fills -1..1 along the longest side of the bulk's box."""
         low, high = self.bulk
         half = float((high - low).max()) / 2.0
-        return low + (high - low) / 2.0, half if half > 0.0 else 1.0
+        return _read_only(low + (high - low) / 2.0), half if half > 0.0 else 1.0
 
     @functools.cached_property
     def unit_vertices(self) -> np.ndarray:
         """(n, 3) float32 in the unit frame. The shift is done in float64, so a far-off mesh loses nothing."""
         centre, half = self.unit_frame
-        return np.clip((self.vertices - centre) / half, -1e30, 1e30).astype(np.float32)
+        return _read_only(np.clip((self.vertices - centre) / half, -1e30, 1e30).astype(np.float32))
+
+
+def _read_only(array: np.ndarray) -> np.ndarray:
+    array.flags.writeable = False
+    return array
 
 
 def _array(values: Any, dtype: type, width: int, name: str) -> np.ndarray:
     try:
-        array: np.ndarray = np.ascontiguousarray(values, dtype)
+        # A copy, whatever is given: the caller's array stays the caller's.
+        array: np.ndarray = np.array(values, dtype, order="C")
     except (TypeError, ValueError) as error:
         raise InputError(f"{name} must be numbers of shape (n, {width}), got {type(values).__name__}") from error
     if array.ndim != 2 or array.shape[1] != width:
@@ -145,4 +154,9 @@ def _indices(values: Any) -> np.ndarray:
             array = whole
     except (TypeError, ValueError, OverflowError) as error:
         raise InputError("faces must be whole numbers of shape (m, 3)") from error
-    return _array(array, np.int64, 3, "faces")
+    return _array(array, np.int32 if _fits_int32(array) else np.int64, 3, "faces")
+
+
+def _fits_int32(array: np.ndarray) -> bool:
+    limits = np.iinfo(np.int32)
+    return limits.min <= int(array.min()) and int(array.max()) <= limits.max
