@@ -3,7 +3,7 @@
 The pipeline, one module a stage:
 
     scene file -> Scene (scene, shapes, mesh, mesh_files, normals) -> arrays on the device (device_scene)
-      -> G-buffer: what the camera sees (gbuffer, raster)
+      -> G-buffer: what the camera sees (gbuffer, zbuffer, raster)
       -> a method (methods/): its tracer answers reflected rays (trace), whose life is written once (reflect)
            ldt: cull (cull), as fine as needed (resolution), peel on first need (ldt: peel -> fragments, patches, doubts
                 -> grid; kept by cache, checked by grid_check), march (march: march_exact, march_linear)

@@ -238,7 +238,10 @@ def not_culled(scene: DeviceScene) -> Culled:
     """Every ray may meet every object but its own."""
     regions = regions_of_runs(wp.empty((0, 0), dtype=wp.uint32, device=scene.device))
     mirrors = {entry.index for entry in scene.reflectors}
-    return Culled(regions, {entry.index for entry in scene.objects if mirrors - {entry.index}})
+    # A mirror alone is met by no ray.
+    alone = mirrors if len(mirrors) == 1 else set()
+    shown = set(range(len(scene.objects))) - alone if mirrors else set()
+    return Culled(regions, shown)
 
 
 def cull_rays(gbuffer: GBuffer, rays: Any, bounce: int, test: CullTest, stats: launch.Stats) -> Culled:

@@ -17,6 +17,7 @@ import numpy as np
 import warp as wp
 
 from ldtrefl import warp_abi
+from ldtrefl.camera import unit_up
 from ldtrefl.errors import InputError
 from ldtrefl.image import decoded_bytes
 from ldtrefl.mesh import Mesh
@@ -28,6 +29,9 @@ MOST_NUMBERS = (1 << 31) - 1
 
 SPHERE_PADDING = 2.0e-6
 """Device units by which bounding spheres are widened: ten roundings of a float32 anywhere in the device's box."""
+
+CORNERS = np.array(np.meshgrid([0, 1], [0, 1], [0, 1])).reshape(3, -1).T
+"""(8, 3): of a box's corners, along each axis 0 for its low and 1 for its high side."""
 
 
 @wp.struct
@@ -86,6 +90,39 @@ class LightingRecord:
     shadows: int
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
+class Look:
+    """Colours and textures of a mesh's parts, as in an ``ObjectRecord``."""
+
+    part_first: wp.array
+    part_color: wp.array
+    part_texture: wp.array
+    texels: wp.array
+    texel_bytes: wp.array
+
+
+def _look_of(mesh: Mesh, texture: np.ndarray | None, device: wp.Device) -> Look:
+    textures = [part.texture if texture is None else texture for part in mesh.parts]
+    pools: dict[type, list[np.ndarray]] = {np.float32: [], np.uint8: []}
+    places: dict[int, tuple[int, int, int, int]] = {}
+    for picture in textures:
+        if picture is not None and id(picture) not in places:
+            kind = np.uint8 if picture.dtype == np.uint8 else np.float32
+            first = sum(len(pool) for pool in pools[kind])
+            places[id(picture)] = (first, picture.shape[1], picture.shape[0], int(kind is np.uint8))
+            pools[kind].append(np.ascontiguousarray(picture, kind).reshape(-1, 3))
+    if places and mesh.uvs is None:
+        raise InputError("material.texture: the object has no texture coordinates (UVs)")
+    table = [(0, 0, 0, 0) if picture is None else places[id(picture)] for picture in textures]
+    return Look(
+        wp.array([p.first_triangle for p in mesh.parts], dtype=wp.int32, device=device),
+        wp.array([p.color for p in mesh.parts], dtype=wp.vec3, device=device),
+        wp.array(table, dtype=wp.vec4i, device=device),
+        _uploaded(pools[np.float32], wp.vec3, device),
+        _uploaded(pools[np.uint8], wp.vec3ub, device),
+    )
+
+
 class DeviceMesh:
     """A mesh's arrays on a device; what only shading needs when it is asked for."""
 
@@ -93,6 +130,8 @@ class DeviceMesh:
         self.mesh = mesh
         self.vertices = wp.array(mesh.unit_vertices, dtype=wp.vec3, device=device)
         self.faces = wp.array(mesh.faces, dtype=wp.vec3i, device=device)
+        self._looks: dict[int, tuple[np.ndarray | None, Look]] = {}
+        """By ``id`` of the texture, which is kept beside."""
 
     @functools.cached_property
     def strays(self) -> wp.array:
@@ -117,6 +156,18 @@ class DeviceMesh:
         uvs = np.zeros((0, 2), np.float32) if self.mesh.uvs is None else self.mesh.uvs
         return wp.array(uvs, dtype=wp.vec2, device=self.vertices.device)
 
+    @functools.cached_property
+    def no_uvs(self) -> wp.array:
+        """None at all."""
+        return wp.empty(0, dtype=wp.vec2, device=self.vertices.device)
+
+    def look(self, texture: np.ndarray | None) -> Look:
+        """The colours and textures of the mesh's parts; ``texture``, (h, w, 3), stands for all of theirs if given. One
+        for all objects that look the same."""
+        if id(texture) not in self._looks:
+            self._looks[id(texture)] = texture, _look_of(self.mesh, texture, self.vertices.device)
+        return self._looks[id(texture)][1]
+
 
 @dataclasses.dataclass(eq=False)
 class DeviceObject:
@@ -129,6 +180,16 @@ class DeviceObject:
     """(4, 4) float64."""
     record: Any
     """The ``ObjectRecord``."""
+
+    @property
+    def vertex_count(self) -> int:
+        """Vertices of its mesh."""
+        return len(self.geometry.mesh.vertices)
+
+    @property
+    def triangle_count(self) -> int:
+        """Triangles of its mesh."""
+        return len(self.geometry.mesh.faces)
 
     @property
     def longest_side(self) -> float:
@@ -148,9 +209,14 @@ class DeviceScene:
         self.scene = scene
         self.device = device
         self._skip_attributes = skip_attributes
-        self.device_from_world = _device_from_world(scene)
         self._decoded = wp.array(decoded_bytes(), dtype=float, device=device, copy=False)
         former = [] if before is None else before.objects
+        self._corners: np.ndarray = np.zeros((len(scene.objects), 8, 3)) if before is None else before._corners.copy()
+        """(objects, 8, 3) float64, of their boxes in the world."""
+        for index, source in enumerate(scene.objects):
+            if before is None or former[index].source is not source:
+                self._corners[index] = _world_corners(source)
+        self.device_from_world = _device_from_world(self._corners)
         same_space = before is not None and np.array_equal(self.device_from_world, before.device_from_world)
         meshes = {id(entry.geometry.mesh): entry.geometry for entry in former}
         self.objects: list[DeviceObject] = []
@@ -205,9 +271,9 @@ class DeviceScene:
         return {now.index for now, then in zip(self.objects, before.objects, strict=True) if now is not then}
 
     def look_from(self, camera: Camera) -> None:
-        """Turn the environment to the camera's ``up``."""
-        up = np.asarray(camera.up, float)
-        self.lighting.up = wp.vec3(*(up / np.linalg.norm(up)))
+        """Turn the environment to the camera's ``up``. The owner of the scene does so before every frame, and makes one
+        frame at a time."""
+        self.lighting.up = wp.vec3(*unit_up(camera))
 
     def _placed(
         self, index: int, source: Object, geometry: DeviceMesh, first_triangle: int, first_vertex: int
@@ -240,26 +306,12 @@ class DeviceScene:
         return DeviceObject(index, source, geometry, world_from_unit, record)
 
     def _look(self, record: Any, source: Object, geometry: DeviceMesh) -> None:
-        mesh = geometry.mesh
-        textures = [part.texture for part in mesh.parts]
-        if source.texture is not None:
-            textures = [source.texture] * len(mesh.parts)
-        pools: dict[type, list[np.ndarray]] = {np.float32: [], np.uint8: []}
-        places: dict[int, tuple[int, int, int, int]] = {}
-        for texture in textures:
-            if texture is not None and id(texture) not in places:
-                kind = np.uint8 if texture.dtype == np.uint8 else np.float32
-                first = sum(len(pool) for pool in pools[kind])
-                places[id(texture)] = (first, texture.shape[1], texture.shape[0], int(kind is np.uint8))
-                pools[kind].append(np.ascontiguousarray(texture, kind).reshape(-1, 3))
-        needs_uvs = places or not self._skip_attributes
-        record.uvs = geometry.uvs if needs_uvs else wp.empty(0, dtype=wp.vec2, device=self.device)
-        table = [(0, 0, 0, 0) if texture is None else places[id(texture)] for texture in textures]
-        record.part_first = wp.array([p.first_triangle for p in mesh.parts], dtype=wp.int32, device=self.device)
-        record.part_color = wp.array([p.color for p in mesh.parts], dtype=wp.vec3, device=self.device)
-        record.part_texture = wp.array(table, dtype=wp.vec4i, device=self.device)
-        record.texels = _uploaded(pools[np.float32], wp.vec3, self.device)
-        record.texel_bytes = _uploaded(pools[np.uint8], wp.vec3ub, self.device)
+        look = geometry.look(source.texture)
+        has_textures = look.texels.shape[0] + look.texel_bytes.shape[0] > 0
+        needs_uvs = has_textures or not self._skip_attributes
+        record.uvs = geometry.uvs if needs_uvs else geometry.no_uvs
+        record.part_first, record.part_color = look.part_first, look.part_color
+        record.part_texture, record.texels, record.texel_bytes = look.part_texture, look.texels, look.texel_bytes
         record.decoded = self._decoded
 
     def _lighting(self, before: DeviceScene | None) -> Any:
@@ -318,12 +370,11 @@ def _uploaded(pools: list[np.ndarray], dtype: Any, device: wp.Device) -> wp.arra
     return joined
 
 
-def _device_from_world(scene: Scene) -> np.ndarray:
-    corners = [_world_corners(entry) for entry in scene.objects]
-    if not corners:
+def _device_from_world(corners: np.ndarray) -> np.ndarray:
+    """(4, 4) float64 from the corners of the objects' boxes, (objects, 8, 3) in the world."""
+    if not len(corners):
         return np.eye(4)
-    points = np.concatenate(corners)
-    low, high = points.min(axis=0), points.max(axis=0)
+    low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
     half = float((high - low).max()) / 2.0
     scale = 1.0 / half if half > 0.0 else 1.0
     matrix = np.diag([scale, scale, scale, 1.0])
@@ -332,9 +383,9 @@ def _device_from_world(scene: Scene) -> np.ndarray:
 
 
 def _world_corners(entry: Object) -> np.ndarray:
+    """(8, 3) float64: the corners of the object's own box, in the world."""
     low, high = entry.geometry.bounds
-    picks = np.array(np.meshgrid([0, 1], [0, 1], [0, 1])).reshape(3, -1).T
-    corners = np.where(picks == 0, low, high)
+    corners = np.where(CORNERS == 0, low, high)
     return (np.hstack([corners, np.ones((8, 1))]) @ entry.world_from_object().T)[:, :3]
 
 

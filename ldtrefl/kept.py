@@ -15,40 +15,57 @@ import numpy as np
 import warp as wp
 
 from ldtrefl.device_scene import DeviceScene
-from ldtrefl.gbuffer import Drawing, GBuffer, draw_gbuffer
+from ldtrefl.gbuffer import GBuffer, draw_gbuffer, resolved
 from ldtrefl.launch import kernel, launch
 from ldtrefl.rays import RUN, HitBuffer, RayBuffer, bits_of, rays_of, regions_of_runs
 from ldtrefl.scene import Camera
+from ldtrefl.zbuffer import Drawing
+
+
+@dataclass(frozen=True, eq=False)
+class _Drawn:
+    """The last frame, and what its drawing can be used for again."""
+
+    scene: DeviceScene
+    camera: Camera
+    still: Drawing | None = None
+    """What stands still."""
+    moving: frozenset[int] = frozenset()
+    """Objects that are not in it."""
 
 
 class KeptDrawing:
     """G-buffers of frame after frame: while the camera stays, what stands still is drawn once."""
 
     def __init__(self) -> None:
-        self._last: tuple[DeviceScene, Camera] | None = None
-        self._still: Drawing | None = None
-        self._moving: set[int] = set()
-        """What is not in it."""
+        self._last: _Drawn | None = None
+
+    def forget(self) -> None:
+        """Start anew."""
+        self._last = None
 
     def gbuffer(self, scene: DeviceScene, camera: Camera) -> GBuffer:
         """What ``camera`` sees of a scene that comes from the last one."""
-        everything = set(range(len(scene.objects)))
-        moved = everything
-        if self._last is not None and self._last[1] == camera:
-            before = self._last[0].objects
+        # What is kept changes at the end and at once: a frame that is stopped on the way leaves no half of it.
+        everything = frozenset(range(len(scene.objects)))
+        last, moved = self._last, everything
+        if last is not None and last.camera == camera:
             # Pixels do not depend on device space: only what was placed anew has moved.
-            moved = {now.index for now in scene.objects if now.source is not before[now.index].source}
-        self._last = scene, camera
-        if moved == everything:
-            self._still = None
-            return draw_gbuffer(scene, camera)
-        if self._still is None or not moved <= self._moving:
-            self._moving = moved
-            self._still = Drawing.empty(scene, camera)
-            self._still.add(scene, camera, sorted(everything - moved))
-        drawing = self._still.over()
-        drawing.add(scene, camera, sorted(self._moving))
-        return drawing.resolved(scene, camera)
+            before = last.scene.objects
+            moved = frozenset(now.index for now in scene.objects if now.source is not before[now.index].source)
+        if last is None or moved == everything:
+            seen = draw_gbuffer(scene, camera)
+            self._last = _Drawn(scene, camera)
+            return seen
+        still, moving = last.still, last.moving
+        if still is None or not moved <= moving:
+            still, moving = Drawing.empty(scene, camera), moved
+            still.add(scene, camera, sorted(everything - moving))
+        drawing = still.over()
+        drawing.add(scene, camera, sorted(moving))
+        seen = resolved(drawing, scene, camera)
+        self._last = _Drawn(scene, camera, still, moving)
+        return seen
 
 
 @dataclass(frozen=True, eq=False)

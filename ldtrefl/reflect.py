@@ -21,7 +21,7 @@ from ldtrefl import launch
 from ldtrefl.camera import camera_ray
 from ldtrefl.cull import Culled
 from ldtrefl.device_scene import LightingRecord, ObjectRecord
-from ldtrefl.gbuffer import GBuffer, GBufferView, pixel_surface, pixel_view
+from ldtrefl.gbuffer import BLOCK, GBuffer, GBufferView, pixel_surface, pixel_view
 from ldtrefl.kept import Followed, changed_runs, put_hits, rays_of_runs
 from ldtrefl.rays import HitBuffer, RayBuffer, Regions, lowest_bit, meets_sphere, object_bits, sphere_entry
 from ldtrefl.shade import (
@@ -37,9 +37,6 @@ from ldtrefl.strays import StrayHit, no_stray
 from ldtrefl.trace import Hit, Tracer, closest_hit_of, no_hit, occluded_of
 from ldtrefl.unit_rays import into_unit, leaving_point, unit_normal
 from ldtrefl.vectors import as_single, point_along
-
-BLOCK = 8
-"""Pixels along a side of the blocks in which the first rays stand."""
 
 BEYOND = wp.constant(1.000001)
 """Of the distance that was met, how far another object is searched: what lies in the same place must be found too."""
@@ -145,7 +142,7 @@ def next_in_turn(
     return 32 * word + lowest_bit(bits)
 
 
-@functools.cache
+@launch.once
 def closest_hits_kernel(tracer: Tracer, bounds: bool = True) -> wp.Kernel:
     """The kernel that finds where rays end. With ``bounds`` an object is searched for only if the ray enters its
     bounding sphere before it has met another; of 32 the first to be entered comes first."""
@@ -205,7 +202,7 @@ def closest_hits_kernel(tracer: Tracer, bounds: bool = True) -> wp.Kernel:
     return closest_hits
 
 
-@functools.cache
+@launch.once
 def direct_radiance_of(tracer: Tracer) -> Any:
     """``direct_radiance`` with this tracer's shadows."""
     is_blocked = occluded_of(tracer)
@@ -246,7 +243,7 @@ def direct_radiance_of(tracer: Tracer) -> Any:
     return make_direct_radiance(always_lit if view_type is NoView else is_lit)
 
 
-@functools.cache
+@launch.once
 def shade_pixels_kernel(tracer: Tracer) -> wp.Kernel:
     """The kernel that shades what the camera sees, reflectors left out."""
     direct_radiance = direct_radiance_of(tracer)
@@ -273,7 +270,7 @@ def shade_pixels_kernel(tracer: Tracer) -> wp.Kernel:
     return shade_pixels
 
 
-@functools.cache
+@launch.once
 def shade_reflectors_kernel(tracer: Tracer) -> wp.Kernel:
     """The kernel that shades the pixels that see a reflector, without what it reflects, and starts their rays."""
     direct_radiance = direct_radiance_of(tracer)
@@ -306,7 +303,7 @@ def shade_reflectors_kernel(tracer: Tracer) -> wp.Kernel:
     return shade_reflectors
 
 
-@functools.cache
+@launch.once
 def shade_hits_kernel(tracer: Tracer) -> wp.Kernel:
     """The kernel that adds what rays met to their pixels, and sends them on from mirrors."""
     direct_radiance = direct_radiance_of(tracer)
@@ -464,8 +461,7 @@ def follow_rays(
                 culled = cull(going, bounce + 1)
             bound = bind(culled.shown if skips.maps and not shadows else everything)
             hits = _hit_buffer(n, device)
-    shape = (gbuffer.camera.height, gbuffer.camera.width)
-    return made, FirstHits(shape, rays, made.hits, scene.device_units_per_world_unit)
+    return made, FirstHits(gbuffer.shape, rays, made.hits, scene.device_units_per_world_unit)
 
 
 def _copy_to_send_on(rays: Any, beyond_one: bool) -> Any:

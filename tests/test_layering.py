@@ -63,6 +63,7 @@ BOTTOM_TO_TOP = (
     "ldt",
     "layers",
     "raycast",
+    "zbuffer",
     "gbuffer",
     "rays",
     "cull",

@@ -50,6 +50,7 @@ CASES: dict[str, tuple[Size, Size]] = {  # name of the module -> full and quick 
     "kills": (Size(0, 64), Size(0, 16)),
     "bounds": (Size(0, 1), Size(0, 7)),
     "cache_files": (Size(0, 150), Size(0, 12)),
+    "histories": (Size(0, 12), Size(0, 1)),
 }
 
 

@@ -1,7 +1,8 @@
 """The contract of a reflection method: from a G-buffer to an image of reflected radiance.
 
 A method is a class with a ``name`` and a ``Config``. It is made once per renderer, so it may keep maps and trees
-between frames, and asked once per frame.
+between frames, and asked once per frame, or once for each band of a large one. Whatever it keeps, a frame has the bits
+that a new renderer gives it. It is never asked by two threads at once.
 """
 
 from __future__ import annotations
@@ -15,12 +16,14 @@ import warp as wp
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass as pydantic_dataclass
 
-from ldtrefl.device_scene import DeviceScene
+from ldtrefl.device_scene import DeviceMesh, DeviceScene
 from ldtrefl.errors import InputError, first_fault, unknown_name
 from ldtrefl.gbuffer import GBuffer
 from ldtrefl.launch import Stats
+from ldtrefl.raycast import BVH, BvhView, Raycaster
 from ldtrefl.reflect import BoundTracer, FirstHits
 from ldtrefl.skips import Choice, chosen, names
+from ldtrefl.trace import array_of_views
 
 CONFIG = ConfigDict(extra="forbid", use_attribute_docstrings=True)
 """How every method's ``Config`` is checked."""
@@ -34,6 +37,23 @@ class Reflection:
     """(h * w,) vec3: reflected radiance per pixel, before the reflector's own reflectance; 0 off the reflectors."""
     hits: FirstHits | None = None
     """Where the first rays ended, for methods that have rays."""
+
+
+class Trees:
+    """The BVHs of a scene, one a mesh, built when they are first needed."""
+
+    def __init__(self) -> None:
+        self._bound: tuple[BoundTracer, dict[DeviceMesh, Raycaster]] | None = None
+
+    def bound(self, scene: DeviceScene, stats: Stats) -> BoundTracer:
+        """The tracer over all objects, of this scene and of all that come from it."""
+        if self._bound is None:
+            with stats.stage("build", scene.device):
+                meshes = dict.fromkeys(entry.geometry for entry in scene.objects)
+                trees = {mesh: Raycaster.of(mesh) for mesh in meshes}
+                views = [trees[entry.geometry].view() for entry in scene.objects]
+                self._bound = BoundTracer(BVH, array_of_views(views, BvhView, scene.device)), trees
+        return self._bound[0]
 
 
 @pydantic_dataclass(frozen=True, kw_only=True, config=CONFIG)
@@ -68,8 +88,12 @@ class Method(abc.ABC):
         only if there are any."""
 
     @abc.abstractmethod
-    def shadow_tracer(self, stats: Stats) -> BoundTracer:
-        """What answers shadow rays from what the camera sees. Called only if the scene has shadows."""
+    def shadow_tracer(self, gbuffer: GBuffer, stats: Stats) -> BoundTracer:
+        """What answers shadow rays from what the camera sees. Called before ``reflect``, only if the scene has
+        shadows."""
+
+    def forget(self) -> None:  # noqa: B027  (most methods keep nothing of the kind)
+        """Drop what is kept of the last frame's pixels: the next frame is too large for that."""
 
     @classmethod
     def describe(cls) -> str:

@@ -16,12 +16,11 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from ldtrefl.cull import not_culled
+from ldtrefl.device_scene import DeviceScene
 from ldtrefl.gbuffer import GBuffer
 from ldtrefl.launch import Stats
-from ldtrefl.methods.base import CONFIG, CommonConfig, Method, Reflection
-from ldtrefl.raycast import BVH, BvhView, Raycaster
+from ldtrefl.methods.base import CONFIG, CommonConfig, Method, Reflection, Trees
 from ldtrefl.reflect import BoundTracer, follow_rays
-from ldtrefl.trace import array_of_views
 
 
 class Bvh(Method):
@@ -36,25 +35,18 @@ class Bvh(Method):
         max_bounces: Annotated[int, Field(strict=True, ge=1, le=64)] | None = None
         """Reflections in reflections; the scene's number if not given."""
 
-    def _bind(self, stats: Stats) -> BoundTracer:
-        if not hasattr(self, "_bound"):
-            with stats.stage("build", self.scene.device):
-                self._trees: dict[int, Raycaster] = {}
-                for entry in self.scene.objects:
-                    if id(entry.geometry) not in self._trees:
-                        self._trees[id(entry.geometry)] = Raycaster.of(entry.geometry)
-                views = [self._trees[id(entry.geometry)].view() for entry in self.scene.objects]
-                self._bound = BoundTracer(BVH, array_of_views(views, BvhView, self.scene.device))
-        return self._bound
+    def __init__(self, scene: DeviceScene, config: Any) -> None:
+        super().__init__(scene, config)
+        self._trees = Trees()
 
-    def shadow_tracer(self, stats: Stats) -> BoundTracer:
+    def shadow_tracer(self, gbuffer: GBuffer, stats: Stats) -> BoundTracer:
         """The BVH itself."""
-        return self._bind(stats)
+        return self._trees.bound(self.scene, stats)
 
     def reflect(self, gbuffer: GBuffer, rays: Any, stats: Stats) -> Reflection:
         """Trace every reflected ray."""
         bounces = self.config.max_bounces or self.scene.scene.reflection.max_bounces
         everything = not_culled(self.scene)
-        cull, bind = (lambda _rays, _bounce: everything), (lambda _objects: self._bind(stats))
+        cull, bind = (lambda _rays, _bounce: everything), (lambda _objects: self._trees.bound(self.scene, stats))
         followed, hits = follow_rays(gbuffer, rays, cull, bind, bounces, self.skips, stats)
         return Reflection(followed.radiance, hits)

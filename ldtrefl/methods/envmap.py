@@ -18,16 +18,17 @@ import warp as wp
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from ldtrefl import launch
+from ldtrefl import budget, launch
 from ldtrefl.device_scene import DeviceObject, DeviceScene
-from ldtrefl.gbuffer import GBuffer, draw_gbuffer
+from ldtrefl.gbuffer import GBuffer, draw_in_bands
 from ldtrefl.launch import Stats
-from ldtrefl.methods.base import CONFIG, CommonConfig, Method, Reflection
-from ldtrefl.raycast import BVH, BvhView, Raycaster
+from ldtrefl.methods.base import CONFIG, CommonConfig, Method, Reflection, Trees
 from ldtrefl.rays import RayBuffer
 from ldtrefl.reflect import BoundTracer, no_shadows, shade_gbuffer
 from ldtrefl.scene import Camera
-from ldtrefl.trace import array_of_views
+
+PIXEL_BYTES = 12
+"""Of a cube map."""
 
 
 @wp.func
@@ -95,22 +96,22 @@ class EnvironmentMap(Method):
 
     def __init__(self, scene: DeviceScene, config: Any) -> None:
         super().__init__(scene, config)
+        self._trees = Trees()
         self._cubes: dict[int, wp.array] = {}
         """By number of the reflector."""
+        self._up: tuple[float, ...] = ()
+        """Where the top of the environment was when they were drawn."""
+        self._cubes_taken = 0
+        """Cube maps that memory has been asked for."""
 
     def place(self, scene: DeviceScene) -> None:
         """Go on with a scene in which some objects have moved: every cube map may show them."""
         super().place(scene)
         self._cubes.clear()
 
-    def shadow_tracer(self, stats: Stats) -> BoundTracer:
+    def shadow_tracer(self, gbuffer: GBuffer, stats: Stats) -> BoundTracer:
         """A cube map has no shadow rays of its own: a BVH answers them."""
-        if not hasattr(self, "_shadows"):
-            with stats.stage("build", self.scene.device):
-                self._trees = [Raycaster.of(entry.geometry) for entry in self.scene.objects]
-                views = [tree.view() for tree in self._trees]
-                self._shadows = BoundTracer(BVH, array_of_views(views, BvhView, self.scene.device))
-        return self._shadows
+        return self._trees.bound(self.scene, stats)
 
     def reflect(self, gbuffer: GBuffer, rays: Any, stats: Stats) -> Reflection:
         """Draw the cube maps on first need, then look up every reflector pixel."""
@@ -118,6 +119,12 @@ class EnvironmentMap(Method):
         radiance = wp.zeros(gbuffer.pixel_count, dtype=wp.vec3, device=device)
         stats.count("rays", n)
         seen = set(np.unique(rays.source.numpy()).tolist())
+        up = tuple(self.scene.lighting.up)
+        if up != self._up:
+            # The environment stands up with the camera: every cube map shows it.
+            self._cubes.clear()
+            self._up = up
+        self._take_memory(len(seen - self._cubes.keys()))
         for entry in self.scene.reflectors:
             if entry.index not in seen:
                 continue
@@ -128,10 +135,18 @@ class EnvironmentMap(Method):
                 launch.launch(reflect_cube, n, inputs, device)
         return Reflection(radiance)
 
+    def _take_memory(self, cubes: int) -> None:
+        """Ask for what so many more cube maps need, once for each reflector."""
+        if cubes > self._cubes_taken:
+            side = self.config.resolution
+            what = f"{cubes} cube maps of 6 x {side} x {side} pixels"
+            budget.take(PIXEL_BYTES * 6 * side * side * cubes, what, "resolution")
+            self._cubes_taken = cubes
+
     def _draw_cube(self, reflector: DeviceObject, stats: Stats) -> wp.array:
         """(6 * resolution^2,) vec3 radiance about the reflector's centre, face by face, row by row."""
         shadows = self.scene.scene.lighting.shadows
-        shadow = self.shadow_tracer(stats) if shadows else no_shadows(self.scene.device)
+        shadow = self._trees.bound(self.scene, stats) if shadows else no_shadows(self.scene.device)
         eye = reflector.world_from_unit[:3, 3]
         size = max(reflector.longest_side, 1e-6 * float(np.abs(eye).max()))
         faces = []
@@ -147,6 +162,6 @@ class EnvironmentMap(Method):
                     width=self.config.resolution,
                     height=self.config.resolution,
                 )
-                seen = draw_gbuffer(self.scene, camera, without=reflector.index)
-                faces.append(shade_gbuffer(seen, shadow).radiance.numpy())
+                for seen in draw_in_bands(self.scene, camera, without=reflector.index):
+                    faces.append(shade_gbuffer(seen, shadow).radiance.numpy())
         return wp.array(np.concatenate(faces), dtype=wp.vec3, device=self.scene.device)
