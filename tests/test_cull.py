@@ -74,7 +74,8 @@ def test_no_ray_is_lost(bend: float) -> None:
     rng = np.random.default_rng(13)
     centre, radius = 3 * rng.normal(size=(SPHERES, 3)), 10.0 ** rng.uniform(-2, 0.3, SPHERES)
     rays = RayBuffer()
-    rays.origin, rays.direction = on_device(origins.reshape(-1, 3)), on_device(directions.reshape(-1, 3))
+    rays.origin = wp.array(origins.reshape(-1, 3), dtype=wp.vec3d, device=launch.resolve_device(None))
+    rays.direction = on_device(directions.reshape(-1, 3))
     device, n = rays.origin.device, rays.origin.shape[0]
     rays.source = wp.full(n, SPHERES, dtype=wp.int32, device=device)
     objects = []
