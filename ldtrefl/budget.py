@@ -3,12 +3,19 @@
 Small files can ask for much: a picture of one colour, a shape of many segments, an archive. So whoever is about to
 allocate what a file asks for first *takes* that many bytes from the account in use. An account is opened for a scene,
 so that what its files need adds up; outside one, every request stands alone.
+
+The promise for files that nobody has looked at (``SECURITY.md`` has the table by kind of file): loading and rendering
+take no more than the limit, half a gigabyte for the program itself, and what the pixels of the camera need. The limit
+is 4 GiB; the environment variable ``LDTREFL_MEMORY``, ``--memory`` and :func:`set_memory_limit` set another. Estimates
+are peaks that were measured, so that what is taken counts what rendering adds to loading.
 """
 
 from __future__ import annotations
 
 import contextlib
 import contextvars
+import os
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -18,47 +25,83 @@ DEFAULT_LIMIT = 4 << 30
 """Bytes: enough for meshes of ten million triangles, and less than most machines have."""
 
 
+VARIABLE = "LDTREFL_MEMORY"
+"""Environment variable that holds another limit."""
+
+_UNITS = {"": 1, "K": 1 << 10, "M": 1 << 20, "G": 1 << 30, "T": 1 << 40}
+
+
 @dataclass
 class _Limit:
-    value: int = DEFAULT_LIMIT
+    value: int | None = None
+    """``None``: the environment's, or else the default."""
 
 
 @dataclass
-class _Account:
+class Account:
+    """What has been taken for one scene."""
+
     taken: int = 0
+    """Bytes."""
 
 
 _limit = _Limit()
-_account: contextvars.ContextVar[_Account | None] = contextvars.ContextVar("ldtrefl_account", default=None)
+_account: contextvars.ContextVar[Account | None] = contextvars.ContextVar("ldtrefl_account", default=None)
 
 
 def set_memory_limit(limit: int | None = None) -> None:
-    """Let a scene take this many bytes from now on; ``None`` means the default, 4 GiB.
+    """Let a scene take this many bytes from now on; ``None`` means that of ``LDTREFL_MEMORY``, or else 4 GiB.
 
     Raises:
         InputError: not a whole number of at least 1.
     """
-    if limit is None:
-        limit = DEFAULT_LIMIT
-    if isinstance(limit, bool) or not hasattr(limit, "__index__") or limit.__index__() < 1:
-        raise InputError(f"the memory limit must be a whole number of bytes, at least 1, got {limit!r}")
-    _limit.value = limit.__index__()
+    if limit is not None:
+        if isinstance(limit, bool) or not hasattr(limit, "__index__") or limit.__index__() < 1:
+            raise InputError(f"the memory limit must be a whole number of bytes, at least 1, got {limit!r}")
+        limit = limit.__index__()
+    _limit.value = limit
 
 
 def memory_limit() -> int:
-    """Bytes that a scene may take."""
-    return _limit.value
+    """Bytes that a scene may take.
+
+    Raises:
+        InputError: ``LDTREFL_MEMORY`` counts and holds no size.
+    """
+    if _limit.value is not None:
+        return _limit.value
+    given = os.environ.get(VARIABLE, "")
+    return size_of(given, VARIABLE) if given.strip() else DEFAULT_LIMIT
+
+
+def size_of(text: str, place: str) -> int:
+    """Bytes that "8G", "1.5 GiB", "512M" or "1000000" stand for; units are powers of 1024.
+
+    Args:
+        text: what a person wrote.
+        place: the option or variable that holds it; the message names it.
+
+    Raises:
+        InputError: it is no size of at least one byte.
+    """
+    number = re.fullmatch(r"\s*(\d{1,18}(?:\.\d{1,9})?)\s*([KMGT]?)(?:i?B)?\s*", text, re.IGNORECASE | re.ASCII)
+    count = int(float(number[1]) * _UNITS[number[2].upper()]) if number else 0
+    if count < 1:
+        raise InputError(f"{place}: expected a size such as 8G, 512M or a number of bytes, got '{text[:40]}'")
+    return count
 
 
 @contextlib.contextmanager
-def account() -> Iterator[None]:
+def account() -> Iterator[Account]:
     """Add up what is taken inside this block; inside another account, that one goes on."""
-    if _account.get() is not None:
-        yield
+    current = _account.get()
+    if current is not None:
+        yield current
         return
-    token = _account.set(_Account())
+    current = Account()
+    token = _account.set(current)
     try:
-        yield
+        yield current
     finally:
         _account.reset(token)
 
@@ -74,12 +117,12 @@ def take(needed: float, what: str, smaller: str = "") -> None:
     Raises:
         InputError: with what was taken before, it is more than is allowed.
     """
-    current = _account.get() or _Account()
-    if current.taken + needed > _limit.value:
+    current, limit = _account.get() or Account(), memory_limit()
+    if current.taken + needed > limit:
         before = f" beside {in_words(current.taken)} for the rest of the scene" if current.taken else ""
         ways = f"{smaller} or --memory" if smaller else "--memory"
         raise InputError(
-            f"{what} needs {in_words(needed)}{before}, allowed are {in_words(_limit.value)} ({ways} changes that)"
+            f"{what} needs {in_words(needed)}{before}, allowed are {in_words(limit)} ({ways} changes that)"
         )
     current.taken += int(needed)
 

@@ -33,6 +33,9 @@ SPHERE_PADDING = 2.0e-6
 CORNERS = np.array(np.meshgrid([0, 1], [0, 1], [0, 1])).reshape(3, -1).T
 """(8, 3): of a box's corners, along each axis 0 for its low and 1 for its high side."""
 
+BRIGHTEST = 1e30
+"""Intensity of a point light in device units: what is brighter is white all the same, and this is finite in float32."""
+
 
 @wp.struct
 class ObjectRecord:
@@ -343,7 +346,8 @@ class DeviceScene:
         record.is_point = int(light.kind == "point")
         if light.position is not None and light.intensity is not None:
             record.position = wp.vec3d(*(self.device_from_world @ [*light.position, 1.0])[:3])
-            record.radiance = wp.vec3(*(np.asarray(light.intensity) * self.device_units_per_world_unit**2))
+            intensity = np.asarray(light.intensity) * self.device_units_per_world_unit**2
+            record.radiance = wp.vec3(*np.minimum(intensity, BRIGHTEST))
         elif light.direction is not None and light.radiance is not None:
             towards = -np.asarray(light.direction, float)
             record.towards = wp.vec3(*(towards / np.linalg.norm(towards)))

@@ -18,11 +18,16 @@ class InputError(ValueError):
     """The user's input is wrong. The message is one line; the command line prints it and exits with status 2."""
 
     def __init__(self, message: str) -> None:
-        super().__init__(" ".join(str(message).split()))
+        super().__init__(printable(" ".join(str(message).split())))
 
     def within(self, place: str) -> InputError:
         """The same fault, with the file or key that holds it put in front."""
         return InputError(f"{place}: {self}")
+
+
+def printable(text: str) -> str:
+    """``text`` with what a terminal would obey, or could not show, written as escapes: names come from files."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
 
 
 def unknown_name(kind: str, name: str, allowed: Iterable[str]) -> InputError:
@@ -33,15 +38,22 @@ def unknown_name(kind: str, name: str, allowed: Iterable[str]) -> InputError:
     return InputError(f"unknown {kind} '{name}'{hint} (allowed: {', '.join(names)})")
 
 
-def first_fault(error: ValidationError, allowed_keys: dict[str, list[str]]) -> InputError:
+def first_fault(
+    error: ValidationError, allowed_keys: dict[str, list[str]], names: dict[str, str] | None = None
+) -> InputError:
     """The first fault that pydantic found, as one line with its full key.
 
-    ``allowed_keys`` maps a table's key without indices ('object.material', '' at the top) to the keys it may hold.
+    Args:
+        error: what pydantic raised.
+        allowed_keys: a table's key without indices ('object.material', '' at the top) -> the keys it may hold.
+        names: what a key at the top is called in Python, where that differs from the file.
     """
     faults = error.errors(include_url=False, include_context=True)
     # A misspelt key often shows as a missing one too: the unknown key is the one to name.
     fault = next((fault for fault in faults if fault["type"] in UNKNOWN_KEY), faults[0])
     location = [part for part in fault["loc"] if not str(part).startswith("function-")]
+    if names and location:
+        location[0] = names.get(str(location[0]), location[0])
     more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
     if fault["type"] in UNKNOWN_KEY:
         table = ".".join(str(part) for part in location[:-1] if isinstance(part, str))
@@ -51,7 +63,7 @@ def first_fault(error: ValidationError, allowed_keys: dict[str, list[str]]) -> I
     given = ""
     if fault["type"] not in ("missing", "missing_argument", "value_error"):
         given = f", got {_shortened(fault['input'])}"
-    message = fault["msg"].removeprefix("Value error, ").removeprefix("Input ")
+    message = fault["msg"].removeprefix("Value error, ").removeprefix("Input ").replace("a valid tuple", "a list")
     text = f"{message}{given}{more}"
     key = _key(location)
     return InputError(f"{key}: {text}" if key else text)
@@ -65,5 +77,8 @@ def _key(location: Iterable[int | str]) -> str:
 
 
 def _shortened(value: object, limit: int = 60) -> str:
-    text = repr(value)
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError):  # a whole number of thousands of digits, lists in lists in lists
+        return f"a {type(value).__name__} too large to be shown"
     return text if len(text) <= limit else text[: limit - 3] + "..."

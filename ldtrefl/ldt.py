@@ -9,10 +9,11 @@ from typing import Annotated, Any
 
 import numpy as np
 import warp as wp
-from pydantic import Field, TypeAdapter, ValidationError
+from pydantic import BeforeValidator, Field, TypeAdapter, ValidationError
 
 from ldtrefl import launch
 from ldtrefl.cache import Entry, current_cache, key_of
+from ldtrefl.checked import plain
 from ldtrefl.cubemap import FACE_NAMES, TexelFrame, texel_frame
 from ldtrefl.device_scene import DeviceMesh
 from ldtrefl.errors import InputError, first_fault, unknown_name
@@ -46,7 +47,7 @@ SAVED = {
 }
 """The arrays of a saved file: type and shape, None where any number will do."""
 
-MOST_TEXELS = 4096
+FEWEST_TEXELS, MOST_TEXELS = 16, 4096
 """Along an object's longest side."""
 LARGEST = 1e30
 """Of a scale and an offset that are read: they are handed to kernels as float32."""
@@ -70,7 +71,10 @@ RAYS_ALL_AROUND = 4096
 FEW_BACKS = 2
 """Of so many rays so few may meet a back in a closed mesh that is wound one way: one in 100,000 slips through."""
 
-_RESOLUTION = TypeAdapter(Annotated[int, Field(strict=True, ge=1, le=MOST_TEXELS)])
+Resolution = Annotated[int, BeforeValidator(plain), Field(strict=True, ge=FEWEST_TEXELS, le=MOST_TEXELS)]
+"""The one definition for Python, methods and the command line."""
+
+_RESOLUTION: TypeAdapter[int] = TypeAdapter(Resolution)
 _QUALITY = TypeAdapter(Quality)
 
 
@@ -344,7 +348,7 @@ def peel(
     Args:
         vertices: (n, 3) numbers, object space.
         faces: (m, 3) vertex numbers.
-        resolution: texels along the longest side of the bounding box, 1 to 4096.
+        resolution: texels along the longest side of the bounding box, 16 to 4096.
         device: 'cpu' (default) or a CUDA device.
         quality: of the exact search: ``"exact"`` tests every triangle; ``"balanced"`` does so unless they are much
             finer than texels; ``"fast"`` tests texels.
@@ -371,6 +375,6 @@ def peel_mesh(
             adapter.validate_python(value)
         except ValidationError as error:
             raise first_fault(error, {}).within(name) from None
-    maps = LayeredDepthTexture(geometry, texel_frame(geometry.mesh, resolution), quality, trusted)
+    maps = LayeredDepthTexture(geometry, texel_frame(geometry.mesh, int(resolution)), quality, trusted)
     maps.view(search)
     return maps

@@ -10,9 +10,9 @@ Nothing is unpacked or read before the memory that it may take is asked for (``b
 
 from __future__ import annotations
 
-import functools
 import io
 import stat
+import weakref
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -31,6 +31,7 @@ from ldtrefl.normals import split_by_side
 from ldtrefl.pillow_limit import no_pixel_limit
 from ldtrefl.pillow_pictures import picture_of, stored_from_pillow, take_pictures
 from ldtrefl.polygons import triangles_of
+from ldtrefl.sharing import shared_while_used
 from ldtrefl.welding import first_of_equals
 
 UNIT = 1e-3
@@ -66,11 +67,23 @@ def load_mesh(path: str | Path) -> Mesh:
         raise InputError(f"{path}: no such mesh ({error.strerror})") from error
     if not stat.S_ISREG(status.st_mode):
         raise InputError(f"{path}: not a file")
-    with no_pixel_limit():
-        return _load_mesh(str(path.resolve()), status.st_mtime_ns, status.st_size)
+    with no_pixel_limit(), budget.account() as account:
+        before = account.taken
+        mesh = _load_mesh(str(path.resolve()), status.st_mtime_ns, status.st_size)
+        taken = account.taken - before
+        if taken == 0 and mesh in _needed:
+            # It is in use already, and part of another scene then.
+            budget.take(_needed[mesh], f"the mesh {path}")
+        elif taken:
+            _needed[mesh] = taken
+    return mesh
 
 
-@functools.lru_cache(maxsize=32)
+_needed: weakref.WeakKeyDictionary[Mesh, int] = weakref.WeakKeyDictionary()
+"""Bytes that were taken for the meshes in use."""
+
+
+@shared_while_used
 def _load_mesh(path: str, _modified: int, _size: int) -> Mesh:
     if archive_kind(path) is None and Path(path).suffix.lower().lstrip(".") not in mesh_formats():
         kinds = ", ".join(sorted([*mesh_formats(), *(ending.lstrip(".") for ending in ARCHIVES)]))

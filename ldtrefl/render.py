@@ -18,6 +18,7 @@ import warp as wp
 
 from ldtrefl import budget, launch
 from ldtrefl.device_scene import DeviceScene
+from ldtrefl.errors import InputError
 from ldtrefl.gbuffer import BAND_PIXELS, GBuffer, draw_gbuffer, draw_in_bands
 from ldtrefl.kept import KeptDrawing
 from ldtrefl.launch import Stats
@@ -216,6 +217,8 @@ class Renderer:
         Raises:
             InputError: an unknown method, option or device, or a value that is not allowed.
         """
+        if not isinstance(scene, Scene):
+            raise InputError(f"a Scene is needed, got {type(scene).__name__} (load_scene reads one from a file)")
         kind = find_method(scene.reflection.method if method is None else method)
         config = kind.configured(options)
         skips = chosen(config.skip)
@@ -261,8 +264,10 @@ class Renderer:
         """Render a frame, seen by ``camera`` or else by the scene's own.
 
         Raises:
-            InputError: the image needs more memory than is allowed.
+            InputError: ``camera`` is none, or the image needs more memory than is allowed.
         """
+        if not isinstance(camera, Camera | None):
+            raise InputError(f"a Camera is needed, got {type(camera).__name__}")
         with self._lock:
             camera = camera or self.scene.camera
             self._take_memory(camera)

@@ -17,6 +17,7 @@ import numpy as np
 from ldtrefl.cull import Culled
 from ldtrefl.device_scene import DeviceMesh, DeviceObject
 from ldtrefl.gbuffer import GBuffer
+from ldtrefl.ldt import FEWEST_TEXELS, MOST_TEXELS
 from ldtrefl.rays import distance_across, rays_of, run_count
 
 TEXEL = {"exact": 0.25, "linear": 0.75}
@@ -35,9 +36,6 @@ SAMPLES = 4096
 
 SURELY = 0.9999
 """Of a bounding sphere's radius what a ray must meet to count: whoever culls by the whole of it has kept that ray."""
-
-SMALLEST, LARGEST = 16, 4096
-"""Texels along an object's longest side."""
 
 
 def footprint(rays: Any, width: int, runs: np.ndarray, entry: DeviceObject) -> float | None:
@@ -107,14 +105,14 @@ def resolutions_for(
             runs = np.flatnonzero(bits[:, entry.index // 32] >> entry.index % 32 & 1) if by_runs else every_run
             reflected = footprint(rays, gbuffer.camera.width, runs, entry)
             apart += [] if reflected is None else [reflected]
-        wanted = SMALLEST
+        wanted = FEWEST_TEXELS
         if apart and min(apart) > 0.0:
             longest = entry.longest_side * scene.device_units_per_world_unit
             wanted = _rounded_up(longest / (TEXEL[search] * error * min(apart)))
-        finest[entry.geometry] = max(wanted, finest.get(entry.geometry, SMALLEST))
+        finest[entry.geometry] = max(wanted, finest.get(entry.geometry, FEWEST_TEXELS))
     return finest
 
 
 def _rounded_up(texels: float) -> int:
     """The next power of the root of 2, within what is allowed."""
-    return int(np.clip(round(2.0 ** (np.ceil(2.0 * np.log2(max(texels, 1.0))) / 2.0)), SMALLEST, LARGEST))
+    return int(np.clip(round(2.0 ** (np.ceil(2.0 * np.log2(max(texels, 1.0))) / 2.0)), FEWEST_TEXELS, MOST_TEXELS))

@@ -1,76 +1,71 @@
 """The scene: dataclasses that check themselves, and ``load_scene`` for TOML files.
 
-Conventions: right-handed, any ``up``. Angles in degrees, radiance linear RGB. Every dataclass may be built in Python
-with the same names and checks as the file's keys; wrong values raise ``InputError`` (from a file) or pydantic's
-``ValidationError`` (a ``ValueError``, in Python).
+Conventions: right-handed, any ``up``. Angles in degrees, radiance linear RGB; one number stands for a grey. Every
+dataclass may be built in Python with the same names and checks as the file's keys; wrong values raise ``InputError``.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import functools
+import json
+import logging
 import os
-import tomllib
 import typing
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
+from pydantic import BeforeValidator, Field, TypeAdapter, ValidationError, WrapValidator, model_validator
 from pydantic.dataclasses import dataclass
 
-from ldtrefl import shapes
-from ldtrefl.errors import InputError, first_fault, unknown_name
+from ldtrefl import budget, shapes
+from ldtrefl.checked import (
+    CONFIG,
+    LARGEST,
+    SMALLEST,
+    Color,
+    Direction,
+    Flag,
+    Intensity,
+    Number,
+    Positive,
+    Real,
+    Reflectance,
+    Scale,
+    Text,
+    Vector,
+    Whole,
+    plain,
+    refusing_in_one_line,
+)
+from ldtrefl.errors import InputError, first_fault, printable, unknown_name
 from ldtrefl.image import stored_picture
 from ldtrefl.mesh import Mesh
 from ldtrefl.mesh_files import load_mesh
+from ldtrefl.toml_text import read_toml
 
 MESH_PATH_VARIABLE = "LDTREFL_MESH_PATH"
 MAX_SIDE = 16384
 """Pixels along a side of an image, and objects in a scene."""
-LARGEST = 1e15
-"""Largest coordinate: its square and the products of two stay far inside float32's range once scaled."""
+MAX_LIGHTS = 64
+NARROWEST = 1e-6
+"""Least degrees that a camera sees: at 16,384 pixels a pixel's share is still far above float64's rounding."""
+ROUNDING = 1e-6
+"""By which albedo and mirror may add up to more than 1: 0.9 + 0.1 are written in decimals."""
+
+_log = logging.getLogger("ldtrefl")
 
 
-def _no_bool(value: Any) -> Any:
-    if isinstance(value, bool):
-        raise ValueError("should be a number")
-    return value
-
-
-Number = Annotated[float, BeforeValidator(_no_bool), Field(strict=True, allow_inf_nan=False, ge=-LARGEST, le=LARGEST)]
-Positive = Annotated[float, BeforeValidator(_no_bool), Field(strict=True, gt=0.0, le=LARGEST, allow_inf_nan=False)]
-Whole = Annotated[int, Field(strict=True)]
-Flag = Annotated[bool, Field(strict=True)]
-Text = Annotated[str, Field(strict=True, min_length=1)]
-Vector = tuple[Number, Number, Number]
-Color = tuple[Annotated[Number, Field(ge=0.0)], Annotated[Number, Field(ge=0.0)], Annotated[Number, Field(ge=0.0)]]
-Reflectance = tuple[
-    Annotated[Number, Field(ge=0.0, le=1.0)],
-    Annotated[Number, Field(ge=0.0, le=1.0)],
-    Annotated[Number, Field(ge=0.0, le=1.0)],
-]
-
-
-def _nonzero(vector: tuple[float, float, float]) -> tuple[float, float, float]:
-    if not any(vector):
-        raise ValueError("must not be the zero vector")
-    return vector
-
-
-Direction = Annotated[Vector, AfterValidator(_nonzero)]
-
-_CONFIG = ConfigDict(extra="forbid", arbitrary_types_allowed=True, populate_by_name=True)
-
-
-@dataclass(frozen=True, kw_only=True, config=_CONFIG)
+@refusing_in_one_line
+@dataclass(frozen=True, kw_only=True, config=CONFIG)
 class Camera:
     """A pinhole camera; pixel centres at +0.5, row 0 at the top."""
 
     eye: Vector
     look_at: Vector
     up: Direction = (0.0, 0.0, 1.0)
-    fov_y: Annotated[float, Field(strict=True, gt=0.0, lt=180.0)] = 40.0
+    fov_y: Annotated[Real, Field(ge=NARROWEST, lt=180.0)] = 40.0
     """Degrees from the lower to the upper edge of the image."""
     width: Annotated[Whole, Field(ge=1, le=MAX_SIDE)] = 768
     height: Annotated[Whole, Field(ge=1, le=MAX_SIDE)] = 512
@@ -78,15 +73,16 @@ class Camera:
     @model_validator(mode="after")
     def _looks_somewhere(self) -> Camera:
         forward = np.subtract(self.look_at, self.eye)
-        if not forward.any():
-            raise ValueError("eye and look_at are the same point")
+        if np.abs(forward).max() < SMALLEST:
+            raise ValueError(f"eye and look_at are the same point, or closer than {SMALLEST:g}")
         up = np.asarray(self.up) / np.linalg.norm(self.up)
         if np.linalg.norm(np.cross(forward / np.linalg.norm(forward), up)) < 1e-9:  # float64 can't tell a side
             raise ValueError("up is parallel to the line from eye to look_at")
         return self
 
 
-@dataclass(frozen=True, kw_only=True, config=_CONFIG)
+@refusing_in_one_line
+@dataclass(frozen=True, kw_only=True, config=CONFIG)
 class Environment:
     """What a ray that hits nothing sees: a blend by height, or an equirectangular image."""
 
@@ -95,7 +91,8 @@ class Environment:
     image: Text | None = None
 
 
-@dataclass(frozen=True, kw_only=True, config=_CONFIG)
+@refusing_in_one_line
+@dataclass(frozen=True, kw_only=True, config=CONFIG)
 class Lighting:
     """What all lights share."""
 
@@ -104,7 +101,8 @@ class Lighting:
     shadows: Flag = False
 
 
-@dataclass(frozen=True, kw_only=True, config=_CONFIG)
+@refusing_in_one_line
+@dataclass(frozen=True, kw_only=True, config=CONFIG)
 class Light:
     """A directional or a point light."""
 
@@ -114,7 +112,7 @@ class Light:
     radiance: Color | None = None
     """Directional: radiance leaving a white diffuse surface that faces the light."""
     position: Vector | None = None
-    intensity: Color | None = None
+    intensity: Intensity | None = None
     """Point: ``intensity / distance^2`` in place of ``radiance``."""
 
     @model_validator(mode="after")
@@ -128,11 +126,21 @@ class Light:
         return self
 
 
-@dataclass(frozen=True, kw_only=True, config=_CONFIG)
+class _Unstated(tuple[float, float, float]):
+    """A colour that nobody has stated. It stays so when a material is built from another by ``dataclasses.replace``."""
+
+
+def _if_stated(value: Any, check: Any) -> Any:
+    return value if isinstance(value, _Unstated) else check(value)
+
+
+@refusing_in_one_line
+@dataclass(frozen=True, kw_only=True, config=CONFIG)
 class Material:
     """``emission + albedo * texture * light + mirror * reflected radiance``."""
 
-    albedo: Color = (0.8, 0.8, 0.8)
+    albedo: Annotated[Color, WrapValidator(_if_stated)] = _Unstated((0.8, 0.8, 0.8))
+    """0.8 if it is not given; 0 where ``mirror`` is, because a mirror that also scatters light gives back too much."""
     texture: Text | None = None
     """A picture, times albedo; needs UVs. Without one, the mesh file's own textures count."""
     emission: Color = (0.0, 0.0, 0.0)
@@ -141,8 +149,22 @@ class Material:
     fresnel: Flag = False
     """Schlick's approximation, with ``mirror`` as the reflectance at normal incidence."""
 
+    @model_validator(mode="after")
+    def _albedo_if_unstated(self) -> Material:
+        if isinstance(self.albedo, _Unstated):
+            object.__setattr__(self, "albedo", _Unstated((0.0 if any(self.mirror) else 0.8,) * 3))
+        return self
 
-@dataclass(frozen=True, kw_only=True, config=_CONFIG)
+    @property
+    def excess(self) -> tuple[float, str] | None:
+        """The largest sum of albedo and mirror in a channel, and the channel, where it is above 1; else None."""
+        channels = zip(self.albedo, self.mirror, ("red", "green", "blue"), strict=True)
+        largest = max((albedo + mirror, name) for albedo, mirror, name in channels)
+        return largest if largest[0] > 1.0 + ROUNDING else None
+
+
+@refusing_in_one_line
+@dataclass(frozen=True, kw_only=True, config=CONFIG)
 class Object:
     """A mesh or a shape, placed: fit, then scale, rotate, translate."""
 
@@ -153,8 +175,8 @@ class Object:
     params: dict[str, Any] = Field(default_factory=dict)
     fit: Positive | None = None
     """Centre the bounding box at 0 and scale its longest side to this, first."""
-    scale: Positive | tuple[Positive, Positive, Positive] = 1.0
-    rotate: tuple[Number, Number, Number, Number] = (0.0, 0.0, 1.0, 0.0)
+    scale: Scale = 1.0
+    rotate: Annotated[tuple[Number, Number, Number, Number], BeforeValidator(plain)] = (0.0, 0.0, 1.0, 0.0)
     """Axis and degrees."""
     translate: Vector = (0.0, 0.0, 0.0)
     smooth: Flag = True
@@ -167,8 +189,19 @@ class Object:
             raise ValueError("needs either 'mesh' or 'shape', and not both")
         if self.params and self.shape is None:
             raise ValueError("'params' goes with 'shape'")
-        if not any(self.rotate[:3]):
-            raise ValueError("rotate: the axis must not be the zero vector")
+        if max(map(abs, self.rotate[:3])) < SMALLEST:
+            raise ValueError(f"rotate: the axis must not be the zero vector, nor shorter than {SMALLEST:g}")
+        return self
+
+    @model_validator(mode="after")
+    def _says_if_it_shines(self) -> Object:
+        if self.material.excess is not None:
+            total, channel = self.material.excess
+            called = self.name or self.shape or (self.mesh if isinstance(self.mesh, str) else "without a name")
+            _warn_once(
+                f"object '{printable(called)}': material.albedo and material.mirror add up to {total:.3g} in "
+                f"{channel}: above 1 it gives back more light than falls on it"
+            )
         return self
 
     @functools.cached_property
@@ -189,13 +222,36 @@ class Object:
         return any(self.material.mirror)
 
     def world_from_object(self) -> np.ndarray:
-        """(4, 4) float64."""
+        """(4, 4) float64.
+
+        Raises:
+            InputError: fit, scale and the mesh's own size give a size that is not allowed.
+        """
+        return self._world_from_object.copy()
+
+    @functools.cached_property
+    def _world_from_object(self) -> np.ndarray:
+        low, high = self.geometry.bounds
+        side = float((high - low).max())
         matrix = np.eye(4)
-        if self.fit is not None:
-            low, high = self.geometry.bounds
-            side = float((high - low).max())
-            matrix = _scaling(self.fit / side if side > 0.0 else 1.0) @ _translation(-(low + (high - low) / 2))
-        return _translation(self.translate) @ _rotation(self.rotate) @ _scaling(self.scale) @ matrix
+        with np.errstate(all="ignore"):  # what is not finite is refused below
+            if self.fit is not None:
+                matrix = _scaling(self.fit / side if side > 0.0 else 1.0) @ _translation(-(low + (high - low) / 2))
+            matrix = _translation(self.translate) @ _rotation(self.rotate) @ _scaling(self.scale) @ matrix
+            sizes = np.linalg.norm(matrix[:3, :3] * (side or 1.0), axis=0)
+        if not (np.isfinite(matrix).all() and SMALLEST <= sizes.min() and sizes.max() <= LARGEST):
+            fit = "" if self.fit is None else f"fit {self.fit:g}, "
+            raise InputError(
+                f"{fit}scale {self.scale} and the mesh's own size of {side:g} give a size of {sizes.min():g} to "
+                f"{sizes.max():g} along its axes, allowed are {SMALLEST:g} to {LARGEST:g}"
+            )
+        return matrix
+
+
+@functools.lru_cache(maxsize=1024)
+def _warn_once(line: str) -> None:
+    """Say it once: an object is built anew whenever it is moved."""
+    _log.warning("%s", line)
 
 
 def _translation(offset: Any) -> np.ndarray:
@@ -223,7 +279,8 @@ def _rotation(axis_and_degrees: tuple[float, float, float, float]) -> np.ndarray
     return matrix
 
 
-@dataclass(frozen=True, kw_only=True, config=_CONFIG)
+@refusing_in_one_line
+@dataclass(frozen=True, kw_only=True, config=CONFIG)
 class Reflection:
     """The scene's defaults for rendering; the caller's and the command line's win."""
 
@@ -231,21 +288,23 @@ class Reflection:
     max_bounces: Annotated[Whole, Field(ge=1, le=64)] = 1
 
 
-@dataclass(frozen=True, kw_only=True, config=_CONFIG)
+@refusing_in_one_line
+@dataclass(frozen=True, kw_only=True, config=CONFIG)
 class Expectation:
     """What the image tests hold a method to in this scene."""
 
-    ssim: Annotated[float, Field(strict=True, ge=0.0, le=1.0)]
+    ssim: Annotated[Real, Field(ge=0.0, le=1.0)]
 
 
-@dataclass(frozen=True, kw_only=True, config=_CONFIG)
+@refusing_in_one_line
+@dataclass(frozen=True, kw_only=True, config=CONFIG)
 class Scene:
     """A camera, lights and objects."""
 
     camera: Camera
     environment: Environment = Field(default_factory=Environment)
     lighting: Lighting = Field(default_factory=Lighting)
-    lights: Annotated[tuple[Light, ...], Field(alias="light", max_length=64)] = ()
+    lights: Annotated[tuple[Light, ...], Field(alias="light", max_length=MAX_LIGHTS)] = ()
     objects: Annotated[tuple[Object, ...], Field(alias="object", max_length=MAX_SIDE)] = ()
     reflection: Reflection = Field(default_factory=Reflection)
     expect: dict[str, Expectation] = Field(default_factory=dict)
@@ -278,8 +337,8 @@ class Scene:
                 raise unknown_name("field of an object", field, known)
         try:
             changed = dataclasses.replace(self.objects[number], **changes)
-        except ValidationError as error:
-            raise first_fault(error, {}).within(f"object '{name}'") from None
+        except InputError as error:
+            raise error.within(f"object '{name}'") from None
         if not {"mesh", "shape", "params"} & set(changes):
             changed.__dict__["geometry"] = self.objects[number].geometry  # not made again
         return dataclasses.replace(self, objects=(*self.objects[:number], changed, *self.objects[number + 1 :]))
@@ -314,24 +373,22 @@ def load_scene(path: str | Path) -> Scene:
         InputError: one line naming the file, the key, what is wrong and what is allowed.
     """
     path = Path(path)
-    try:
-        tables = tomllib.loads(path.read_bytes().decode("utf-8"))
-    except OSError as error:
-        raise InputError(f"{path}: the scene file cannot be read ({error.strerror})") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise InputError(f"{path}: not TOML ({error})") from error
+    tables = read_toml(path)
     try:
         scene = _ADAPTER.validate_python(tables)
     except ValidationError as error:
         raise first_fault(error, _allowed_keys(Scene)).within(str(path)) from None
     except InputError as error:
         raise error.within(str(path)) from None
-    return _found(scene, path)
+    with budget.account():
+        return _found(scene, path)
 
 
 def _found(scene: Scene, path: Path) -> Scene:
     """The scene with every file found and read; a fault names the key."""
     objects = []
+    meshes: dict[tuple[str | None, str, str], Mesh] = {}
+    textures: dict[str | None, np.ndarray | None] = {None: None}
     for index, entry in enumerate(scene.objects):
         key = f"object[{index}]"
         mesh = entry.mesh
@@ -342,17 +399,24 @@ def _found(scene: Scene, path: Path) -> Scene:
             found = _beside(path, material.texture, f"{key}.material.texture")
             material = dataclasses.replace(material, texture=found)
         placed = dataclasses.replace(entry, mesh=mesh, material=material)
-        _read(path, f"{key}.{'mesh' if entry.shape is None else 'shape'}", lambda placed=placed: placed.geometry)
-        _read(path, f"{key}.material.texture", lambda placed=placed: placed.texture)
+        # What several objects share is made once, and so is taken from the budget once.
+        source = entry.shape, str(mesh), json.dumps(entry.params, sort_keys=True, default=str)
+        if source in meshes:
+            placed.__dict__["geometry"] = meshes[source]
+        meshes[source] = _read(path, f"{key}.{'mesh' if entry.shape is None else 'shape'}", placed, "geometry")
+        if material.texture in textures:
+            placed.__dict__["texture"] = textures[material.texture]
+        textures[material.texture] = _read(path, f"{key}.material.texture", placed, "texture")
         if placed.material.texture is not None and placed.geometry.uvs is None:
             raise InputError(f"{path}: {key}.material.texture: the object has no texture coordinates (UVs)")
+        _read(path, key, placed, "_world_from_object")
         objects.append(placed)
     environment = scene.environment
     if environment.image is not None:
         found = _beside(path, environment.image, "environment.image")
         environment = dataclasses.replace(environment, image=found)
     ready = dataclasses.replace(scene, objects=tuple(objects), environment=environment)
-    _read(path, "environment.image", lambda: ready.environment_image)
+    _read(path, "environment.image", ready, "environment_image")
     return ready
 
 
@@ -371,9 +435,10 @@ def _beside(scene_path: Path, name: str, key: str) -> str:
     raise InputError(f"{scene_path}: {key}: no file '{name}' (looked {places})")
 
 
-def _read(path: Path, key: str, reader: Any) -> None:
+def _read(path: Path, key: str, owner: Object | Scene, attribute: str) -> Any:
+    """An attribute that is read or made when it is asked for; a fault names the file and the key."""
     try:
-        reader()
+        return getattr(owner, attribute)
     except InputError as error:
         raise InputError(f"{path}: {key}: {error}") from None
     except MemoryError:

@@ -11,15 +11,17 @@ import functools
 import inspect
 import json
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
 from pydantic import ConfigDict, Field, ValidationError, validate_call
 from skimage.measure import marching_cubes
 
-from ldtrefl import teapot_patches
-from ldtrefl.errors import first_fault, unknown_name
+from ldtrefl import budget, teapot_patches
+from ldtrefl.errors import InputError, first_fault, unknown_name
 from ldtrefl.mesh import Mesh
+from ldtrefl.sharing import shared_while_used
 
 Segments = Annotated[int, Field(strict=True, ge=1, le=4096)]
 Around = Annotated[int, Field(strict=True, ge=3, le=8192)]
@@ -27,7 +29,32 @@ Grid = Annotated[int, Field(strict=True, ge=16, le=400)]
 Fraction = Annotated[float, Field(strict=True, gt=0.0, lt=1.0)]
 Flag = Annotated[bool, Field(strict=True)]
 
-_SHAPES: dict[str, Callable[..., Mesh]] = {}
+# Bytes at the peak of making and rendering, by tools/stress_cases/hostile.py's measure: process size over what the
+# process has without the shape.
+MADE_NORMALS_BYTES = 600
+"""A triangle, where vertex normals are made from the triangles; 200 of them are the device's arrays and the grid."""
+KNOWN_NORMALS_BYTES = 250
+"""A triangle, where they are not."""
+CELL_BYTES = 60
+"""A cell that marching cubes samples."""
+MESH_BYTES = 110
+"""A triangle that marching cubes gives, while the samples are there."""
+FIXED_BYTES = 16 << 10
+"""Any shape: what Python and the device keep for it."""
+
+
+@dataclass(frozen=True)
+class _Shape:
+    """What is known of a shape; both functions check its parameters."""
+
+    make: Callable[..., Mesh]
+    needed: Callable[..., float]
+    """Bytes for making and rendering it."""
+    smaller: tuple[str, ...]
+    """The parameters that make it smaller."""
+
+
+_SHAPES: dict[str, _Shape] = {}
 
 
 def names() -> list[str]:
@@ -43,22 +70,67 @@ def make(name: str, params: dict[str, Any] | None = None) -> Mesh:
     """
     if name not in _SHAPES:
         raise unknown_name("shape", name, _SHAPES)
-    return _make(name, json.dumps(params or {}, sort_keys=True, default=str))
-
-
-@functools.lru_cache(maxsize=64)
-def _make(name: str, params: str) -> Mesh:
+    try:
+        written = json.dumps(params or {}, sort_keys=True, default=_in_json)
+    except (TypeError, ValueError, RecursionError) as error:  # names of two kinds, lists within themselves
+        raise InputError(f"params: not names and values ({error})") from None
     shape = _SHAPES[name]
     try:
-        return shape(**json.loads(params))
+        needed = shape.needed(**json.loads(written))
     except ValidationError as error:
-        raise first_fault(error, {"": list(inspect.signature(shape).parameters)}) from None
+        raise first_fault(error, {"": list(inspect.signature(shape.make).parameters)}).within("params") from None
+    # Asked for even if it is in use already: it is part of another scene then.
+    budget.take(needed, f"the shape '{name}'", " and ".join(f"params.{key}" for key in shape.smaller))
+    return _make(name, written)
 
 
-def _shape(function: Callable[..., Mesh]) -> Callable[..., Mesh]:
-    checked = validate_call(config=ConfigDict(allow_inf_nan=False))(function)
-    _SHAPES[function.__name__] = checked
-    return checked
+def _in_json(value: Any) -> Any:
+    """NumPy's numbers and arrays as plain ones, anything else in words: no parameter takes those."""
+    return value.tolist() if isinstance(value, (np.generic, np.ndarray)) else str(value)
+
+
+@shared_while_used
+def _make(name: str, params: str) -> Mesh:
+    return _SHAPES[name].make(**json.loads(params))
+
+
+def _shape(needed: Callable[..., float], smaller: str) -> Callable[[Callable[..., Mesh]], Callable[..., Mesh]]:
+    """Make a function a shape, named as it is.
+
+    Args:
+        needed: its parameters -> the bytes that making and rendering it takes, an estimate.
+        smaller: the parameters that make it smaller.
+    """
+
+    def register(function: Callable[..., Mesh]) -> Callable[..., Mesh]:
+        check = validate_call(config=ConfigDict(allow_inf_nan=False))
+        signature = inspect.signature(function)
+
+        @functools.wraps(function)
+        def needed_of(*arguments: Any, **given: Any) -> Any:
+            values = signature.bind(*arguments, **given)
+            values.apply_defaults()
+            return needed(**values.arguments)
+
+        _SHAPES[function.__name__] = _Shape(check(function), check(needed_of), tuple(smaller.split()))
+        return function
+
+    return register
+
+
+def _flat(triangles: float) -> float:
+    """Bytes of a shape whose normals are known."""
+    return FIXED_BYTES + KNOWN_NORMALS_BYTES * triangles
+
+
+def _smoothed(triangles: float) -> float:
+    """Bytes of a shape whose normals are made from its triangles."""
+    return FIXED_BYTES + MADE_NORMALS_BYTES * triangles
+
+
+def _sampled(cells: float, triangles: float) -> float:
+    """Bytes of a surface by marching cubes: the samples are gone when the triangles are rendered."""
+    return FIXED_BYTES + max(CELL_BYTES * cells + MESH_BYTES * triangles, MADE_NORMALS_BYTES * triangles)
 
 
 # Building blocks.
@@ -157,7 +229,7 @@ def _signed_volume(vertices: np.ndarray, faces: np.ndarray) -> float:
 # The shapes.
 
 
-@_shape
+@_shape(lambda segments: _flat(2 * segments[0] * segments[1]), "segments")
 def sphere(segments: tuple[Around, Segments] = (192, 96)) -> Mesh:
     """Radius 1; segments around and from pole to pole."""
 
@@ -169,25 +241,25 @@ def sphere(segments: tuple[Around, Segments] = (192, 96)) -> Mesh:
     return _parametric(position, *segments, wrap_u=True, normal=position)
 
 
-@_shape
+@_shape(lambda segments: _flat(2 * segments**2), "segments")
 def plane(segments: Segments = 1) -> Mesh:
     """-1 to 1 in x and y, facing +z."""
     return _rectangle([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], segments)
 
 
-@_shape
+@_shape(lambda segments: _flat(12 * segments**2), "segments")
 def box(segments: Segments = 1) -> Mesh:
     """-1 to 1, flat sides, the whole texture on each."""
     return _join(*_box_sides(segments))
 
 
-@_shape
+@_shape(lambda segments: _flat(12 * segments**2), "segments")
 def room(segments: Segments = 1) -> Mesh:
     """A box seen from inside."""
     return _join(*_box_sides(segments, inwards=True))
 
 
-@_shape
+@_shape(lambda hole, segments: _flat(32 * segments**2), "segments")
 def hollow_box(hole: Fraction = 0.6, segments: Segments = 1) -> Mesh:
     """A box from -1 to 1 with a square hole of half-width ``hole`` through it, along z."""
     ring = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
@@ -205,7 +277,7 @@ def hollow_box(hole: Fraction = 0.6, segments: Segments = 1) -> Mesh:
     return _join(*sides)
 
 
-@_shape
+@_shape(lambda minor, segments: _flat(2 * segments[0] * segments[1]), "segments")
 def torus(minor: Fraction = 0.35, segments: tuple[Around, Around] = (192, 96)) -> Mesh:
     """About z, radii 1 and ``minor``."""
 
@@ -219,7 +291,7 @@ def torus(minor: Fraction = 0.35, segments: tuple[Around, Around] = (192, 96)) -
     return _parametric(lambda u, v: ring(u) + minor * normal(u, v), *segments, wrap_u=True, wrap_v=True, normal=normal)
 
 
-@_shape
+@_shape(lambda p, q, tube, segments: _smoothed(2 * segments[0] * segments[1]), "segments")
 def torus_knot(
     p: Annotated[int, Field(strict=True, ge=1, le=64)] = 2,
     q: Annotated[int, Field(strict=True, ge=1, le=64)] = 3,
@@ -249,7 +321,7 @@ def torus_knot(
     return _outwards(_fitted(_parametric(position, *segments, wrap_u=True, wrap_v=True)))
 
 
-@_shape
+@_shape(lambda grid: _sampled(0.5 * grid**3, 4.5 * grid**2), "grid")
 def genus3(grid: Grid = 96) -> Mesh:
     """A rounded disc with three holes: the implicit surface z^2 = k f(x, y), f positive between rim and holes."""
     holes = [(0.52 * np.cos(a), 0.52 * np.sin(a)) for a in np.pi / 2 + np.arange(3) * 2 * np.pi / 3]
@@ -264,7 +336,7 @@ def genus3(grid: Grid = 96) -> Mesh:
     return _implicit(field, (1.1, 1.1, 0.5), grid)
 
 
-@_shape
+@_shape(lambda periods, grid: _sampled(grid**3, (4.0 + 9.0 * periods) * grid**2), "periods grid")
 def gyroid(periods: Annotated[float, Field(strict=True, gt=0, le=8)] = 1.5, grid: Grid = 128) -> Mesh:
     """A gyroid's sheet, given a thickness and cut by a ball: closed, of high genus, with deep layers."""
 
@@ -276,7 +348,10 @@ def gyroid(periods: Annotated[float, Field(strict=True, gt=0, le=8)] = 1.5, grid
     return _implicit(field, (1.1, 1.1, 1.1), grid)
 
 
-@_shape
+@_shape(
+    lambda closed, depth, thickness, segments: _smoothed(2 * segments[0] * _rows(closed, segments[1])),
+    "segments",
+)
 def bowl(
     closed: Flag = True,
     depth: Annotated[float, Field(strict=True, gt=0.05, le=1.0)] = 0.7,
@@ -298,6 +373,11 @@ def bowl(
     return _fitted(_revolved(profile, around))
 
 
+def _rows(closed: bool, segments: int) -> int:
+    """Of a bowl's profile: both sides and the rim, or one side."""
+    return 2 * segments + 9 if closed else segments
+
+
 def _revolved(profile: np.ndarray, around: int) -> Mesh:
     """A profile of (radius, z) points turned about z."""
     rows = len(profile) - 1
@@ -309,7 +389,7 @@ def _revolved(profile: np.ndarray, around: int) -> Mesh:
     return _parametric(position, around, rows, wrap_u=True)
 
 
-@_shape
+@_shape(lambda segments: _smoothed(64 * segments**2), "segments")
 def teapot(segments: Segments = 16) -> Mesh:
     """The Utah teapot from its Bezier patches, ``segments`` along a patch's edge. One sheet: lid and body are open."""
     t = np.linspace(0.0, 1.0, segments + 1)
@@ -339,7 +419,7 @@ def teapot(segments: Segments = 16) -> Mesh:
     return _fitted(Mesh(np.concatenate(vertices), np.concatenate(faces), None, np.concatenate(uvs)))
 
 
-@_shape
+@_shape(lambda count, radius, segments: _smoothed(12 * count * segments), "count segments")
 def wires(
     count: Annotated[int, Field(strict=True, ge=1, le=256)] = 8,
     radius: Annotated[float, Field(strict=True, gt=0.0, le=0.5)] = 0.01,

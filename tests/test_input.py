@@ -44,6 +44,21 @@ WRONG = [
         '[[light]]\nkind = "spot"\n[camera]',
         r"light\[0\]\.kind: should be 'directional' or 'point', got 'spot'",
     ),
+    ("[0.9, 0.9, 0.9]", "1.5", r"object\[0\]\.material\.mirror: should be less than or equal to 1, got 1\.5"),
+    ("[0.9, 0.9, 0.9]", '"red"', r"object\[0\]\.material\.mirror: should be a list, got 'red'"),
+    ("[16, 8]", "[8192, 4096]", r"object\[0\]\.shape: the shape 'sphere' needs .* \(params\.segments or --memory"),
+    ("[16, 8]", "[2, 8]", r"object\[0\]\.shape: params: segments\[0\]: "),
+    ("width = 24", "width = " + "9" * 5000, "line 5: a number or a bare key of more than 100 characters"),
+    ("width = 24", "width = " + "[" * 3000, "line 5: more than 32 brackets"),
+    ("width = 24", "a." * 50_000 + "a = 1", "line 5: more than 16 dots"),
+    ("width = 24", "width = 24\nfov_y = 1e-300", r"camera\.fov_y: "),
+    ('"thing"', '"thing"\nscale = 1e-300', r"object\[1\]\.scale: should be from 1e-15 to 1e\+15, got 1e-300"),
+    ('"thing"', '"thing"\nfit = 1e-15\nscale = 1e-15', r"object\[1\]: fit 1e-15, scale 1e-15 and the mesh's own size"),
+    (
+        "[camera]",
+        '[[light]]\nkind = "directional"\nradiance = 1\ndirection = [1e38, 0, 0]\n[camera]',
+        r"light\[0\]\.dire",
+    ),
     ("[camera]", '[[light]]\nkind = "point"\nposition = [0, 0, 1]\n[camera]', r"light\[0\]: a point light needs 'int"),
     ("[camera]", '[environment]\nimage = "none.exr"\n[camera]', r"environment\.image: no file 'none\.exr'"),
     ("[camera]", '[reflection]\nmethod = "magic"\n[camera]', r"unknown method 'magic'"),
@@ -119,7 +134,7 @@ def test_wrong_arrays(vertices: object, faces: object, message: str) -> None:
             maker(vertices, faces)
 
 
-@pytest.mark.parametrize("resolution", [0, -4, 5000, 12.5, "many", True, None])
+@pytest.mark.parametrize("resolution", [0, -4, 15, 4097, 12.5, "many", True, None])
 def test_wrong_resolution(resolution: object) -> None:
     with pytest.raises(ldtrefl.InputError, match=rf"^resolution: should be .*, got {resolution!r}$"):
         ldtrefl.peel(np.eye(3), [[0, 1, 2]], resolution=resolution)

@@ -13,6 +13,9 @@ PACKAGE = Path(ldtrefl.__file__).parent
 BOTTOM_TO_TOP = (
     "errors",
     "budget",
+    "sharing",
+    "toml_text",
+    "checked",
     "files",
     "fingerprint",
     "npz",

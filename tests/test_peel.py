@@ -152,7 +152,7 @@ def test_save_and_load_round_trip(tmp_path: Path) -> None:
 def test_damaged_maps_are_refused(tmp_path: Path) -> None:
     mesh = shapes.make("box")
     path = tmp_path / "maps.npz"
-    ldtrefl.peel(mesh.vertices, mesh.faces, resolution=8).save(path)
+    ldtrefl.peel(mesh.vertices, mesh.faces, resolution=16).save(path)
     whole = path.read_bytes()
     for length in range(0, len(whole), 97):
         path.write_bytes(whole[:length])

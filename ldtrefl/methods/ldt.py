@@ -32,12 +32,13 @@ from ldtrefl.ldt import (
     DEFAULT_RESOLUTION,
     LINEAR_STEPS,
     LayeredDepthTexture,
+    Resolution,
     peel_mesh,
 )
 from ldtrefl.march import TRACERS
 from ldtrefl.methods.base import CONFIG, CommonConfig, Method, Reflection
 from ldtrefl.reflect import BoundTracer, follow_rays, no_shadows, shade_gbuffer
-from ldtrefl.resolution import LARGEST, SMALLEST, resolutions_for
+from ldtrefl.resolution import resolutions_for
 from ldtrefl.scene import Camera
 from ldtrefl.trace import array_of_views
 
@@ -62,7 +63,7 @@ class Ldt(Method):
     class Config(CommonConfig):
         """Options of ``ldt``."""
 
-        resolution: Annotated[int, Field(strict=True, ge=SMALLEST, le=LARGEST)] | None = None
+        resolution: Resolution | None = None
         """Texels along an object's longest side, 16 to 4096; 256 if neither this nor error is given."""
         error: Annotated[float, Field(gt=0.0, le=64.0)] | None = None
         """Pixels that reflected points and shadows may be off by: resolutions are chosen for what is seen."""

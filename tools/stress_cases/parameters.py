@@ -1,4 +1,4 @@
-"""Case 8: map resolutions from 16 to 4096 and below, any number of steps, objects of one texel."""
+"""Case 8: map resolutions from 16 to 4096, any number of steps, objects of one texel."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def run(rays: int, pictures: int) -> list[Outcome]:
     knot = shapes.make("torus_knot", {"segments": [96, 16]})
     origins, directions = rays_about(knot, rays, 80)
     outcomes = []
-    for resolution in (1, 2, 16, 37, 128, 1024, 4096):
+    for resolution in (16, 17, 37, 128, 1024, 4096):
         outcomes += judge_mesh(NAME, f"resolution {resolution}", knot, origins, directions, ANY, resolution)
     for name, shape in (("one texel thick", (1.0, 1.0, 1e-4)), ("one texel wide", (1e-4, 1e-4, 1.0))):
         thin = moved(knot, shape)
