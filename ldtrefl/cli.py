@@ -1,30 +1,31 @@
 """The command line, and nothing else.
 
-Exit status: 0 done, 2 the input is wrong (one line on standard error), 1 anything else.
+Exit status: 0 done, 2 the input is wrong, 130 stopped by Ctrl-C, 1 anything else; in each case but the first one line
+on standard error, and a traceback only for a fault of our own. A reader that has gone, as in ``| head``, is none.
 """
 
 import json
 import os
 import sys
 import time
-import tomllib
 from collections import defaultdict
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TextIO
 
 import numpy as np
 import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
+from rich.text import Text
 from typer.exceptions import TyperException
 
-from ldtrefl import launch, metrics, shapes
+from ldtrefl import budget, launch, metrics, shapes
 from ldtrefl.cache import MapCache, keep_maps_in
 from ldtrefl.device_scene import DeviceMesh
-from ldtrefl.errors import InputError
+from ldtrefl.errors import InputError, printable
 from ldtrefl.files import writable_folder, written_whole
 from ldtrefl.image import check_writable, difference_image, save_image
 from ldtrefl.layers import draw_layers
@@ -35,6 +36,7 @@ from ldtrefl.methods import all_methods, find_method
 from ldtrefl.native import log_on_stderr
 from ldtrefl.render import Frame, Renderer
 from ldtrefl.scene import Scene, load_scene
+from ldtrefl.toml_text import check_regular, parse_toml
 
 PROGRESS_AFTER = 1.0
 """Seconds before a progress bar is shown."""
@@ -59,28 +61,53 @@ SceneFile = Annotated[Path, typer.Argument(metavar="SCENE", help="A scene file (
 Settings = Annotated[
     list[str] | None, typer.Option("--set", metavar="OPTION=VALUE", help="An option of the method; may be repeated.")
 ]
+Memory = Annotated[
+    str | None,
+    typer.Option(
+        "--memory",
+        metavar="SIZE",
+        help="Memory that the scene may take, such as 8G or 512M; LDTREFL_MEMORY or else 4G if not given.",
+    ),
+]
 Device = Annotated[str | None, typer.Option(help="'cpu' (default) or a CUDA device such as 'cuda:0'.")]
 Threads = Annotated[int | None, typer.Option(help="CPU threads; all cores if not given.")]
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line; the exit status."""
+    fault = ""
     try:
         with log_on_stderr():
             result = app(arguments, standalone_mode=False, prog_name="ldtrefl")
+            status = result if isinstance(result, int) else 0
     except (InputError, TyperException) as error:
-        message = error.format_message() if isinstance(error, TyperException) else str(error)
-        print(f"ldtrefl: {' '.join(message.split())}", file=sys.stderr)
-        return 2
-    except typer.Abort:
-        return 1
-    except KeyboardInterrupt:
-        return 130
-    except BrokenPipeError:
-        # The reader of our output has gone, as in `| head`; nothing is left to say to it.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
-    return result if isinstance(result, int) else 0
+        status, fault = 2, error.format_message() if isinstance(error, TyperException) else str(error)
+    except (KeyboardInterrupt, typer.Abort):
+        status = 130
+    except _ReaderGone:
+        status = 0
+    except MemoryError:
+        status, fault = 1, "there is not enough memory on this machine"
+    except OSError as error:  # a file's is an InputError
+        status, fault = 1, f"{error.filename or 'standard output'}: {error.strerror or error}"
+    if not _flushed(sys.stdout) and status == 0:
+        status, fault = 1, "standard output cannot be written"
+    if fault:
+        with suppress(OSError):
+            print(f"ldtrefl: {printable(' '.join(fault.split()))}", file=sys.stderr, flush=True)
+    _flushed(sys.stderr)
+    return status
+
+
+def _flushed(stream: TextIO) -> bool:
+    """Whether all has been written. If not, it is given up, so that the interpreter's end says nothing of it."""
+    try:
+        stream.flush()
+    except (OSError, ValueError) as error:
+        with suppress(OSError, ValueError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+        return isinstance(error, BrokenPipeError)
+    return True
 
 
 @app.command()
@@ -96,9 +123,11 @@ def render(
     no_cache: Annotated[bool, typer.Option("--no-cache", help="Neither read nor keep maps on disk.")] = False,
     device: Device = None,
     threads: Threads = None,
+    memory: Memory = None,
 ) -> None:
     """Render a scene to a picture."""
     launch.set_threads(threads)
+    _allow_memory(memory)
     path = check_writable(output or Path(scene.stem + ".png"))
     if cache is not None and no_cache:
         raise InputError("--cache and --no-cache exclude each other")
@@ -128,9 +157,11 @@ def compare(
     ] = None,
     device: Device = None,
     threads: Threads = None,
+    memory: Memory = None,
 ) -> None:
     """Render a scene by several methods; print errors and write images and difference pictures."""
     launch.set_threads(threads)
+    _allow_memory(memory)
     names = [name.strip() for name in methods.split(",") if name.strip()]
     options = _method_options(settings, [reference, *names])
     folder = writable_folder(output or Path(scene.stem + "-compare"), make=True)
@@ -147,7 +178,8 @@ def compare(
             save_image(folder / f"{name}-difference.png", difference_image(frame.image, truth.image))
     with written_whole(folder / "compare.json") as scratch:
         scratch.write_text(json.dumps(_finite({"scene": str(scene), "reference": reference, **rows})) + "\n")
-    _console().print(_error_table(rows, f"{scene} against {reference} ({truth.reflector_mask.sum()} reflector pixels)"))
+    title = f"{scene} against {reference} ({truth.reflector_mask.sum()} reflector pixels)"
+    _console().print(_error_table(rows, printable(title)))
     _console().print(f"{reference}: {sum(truth.stats.seconds.values()):.3f} s", _stages(truth))
     _console().print(f"images in {folder}")
 
@@ -159,9 +191,11 @@ def peel(
     resolution: Annotated[int, typer.Option(help="Texels along the longest side.")] = DEFAULT_RESOLUTION,
     device: Device = None,
     threads: Threads = None,
+    memory: Memory = None,
 ) -> None:
     """Look at a layered depth texture: layers per face, fragments, bytes and time."""
     launch.set_threads(threads)
+    _allow_memory(memory)
     path = None if output is None else check_writable(output)
     target = launch.resolve_device(device)
     geometry = DeviceMesh(_mesh_or_shape(mesh), target)
@@ -183,14 +217,18 @@ def peel(
 @app.command()
 def info(
     file: Annotated[str, typer.Argument(metavar="SCENE|MESH", help="A scene or mesh file, or a shape's name.")],
+    memory: Memory = None,
 ) -> None:
     """Say what a scene or a mesh holds."""
+    _allow_memory(memory)
     if Path(file).suffix.lower() == ".toml":
-        _scene_info(load_scene(file))
+        with budget.account() as account:
+            loaded = load_scene(file)
+        _scene_info(loaded, account.taken)
     else:
         _mesh_info(_mesh_or_shape(file))
     if note := launch.threading_note():
-        _console().print(note, markup=False)
+        _console().print(note)
 
 
 @cache_commands.command("info")
@@ -214,7 +252,7 @@ def methods() -> None:
     """List every method and its options."""
     console = _console()
     for name, method in all_methods().items():
-        console.print(f"[bold]{name}[/bold]  {method.describe()}")
+        console.print(Text.assemble((name, "bold"), f"  {method.describe()}"))
         for option, (default, words) in method.options().items():
             console.print(f"    {option} = {default!r}  {words}")
 
@@ -236,9 +274,34 @@ def _maps_kept(folder: Path | None, no_cache: bool) -> Iterator[None]:
         keep_maps_in(None)
 
 
+def _allow_memory(size: str | None) -> None:
+    budget.set_memory_limit(None if size is None else budget.size_of(size, "--memory"))
+    budget.memory_limit()  # a wrong value in the environment is said before any work is done
+
+
+class _ReaderGone(Exception):
+    """Nobody reads our output any more; nothing is left to say to it."""
+
+
+class _Printer(Console):
+    """Prints names as they are: they come from files and may look like markup."""
+
+    def __init__(self) -> None:
+        # In a pipe there is no width to fit into: lines are not broken.
+        width = None if sys.stdout.isatty() else 200
+        super().__init__(highlight=False, markup=False, emoji=False, soft_wrap=True, width=width)
+
+    def print(self, *objects: Any, **options: Any) -> None:
+        """Print text without what a terminal would obey."""
+        super().print(*(printable(entry) if isinstance(entry, str) else entry for entry in objects), **options)
+
+    def on_broken_pipe(self) -> None:
+        """Called by rich, which would end the process with status 1."""
+        raise _ReaderGone
+
+
 def _console() -> Console:
-    # In a pipe there is no width to fit into: lines are not broken.
-    return Console(highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else 200)
+    return _Printer()
 
 
 def _in_words(counters: dict[str, int]) -> list[str]:
@@ -305,9 +368,12 @@ def _options(settings: list[str] | None) -> dict[str, Any]:
         if not equals or not name.strip():
             raise InputError(f"--set {setting}: expected OPTION=VALUE")
         try:
-            options[name.strip()] = tomllib.loads(f"value = {value}")["value"]
-        except tomllib.TOMLDecodeError:
-            options[name.strip()] = value.strip()
+            tables = parse_toml(f"value = {value}")
+        except InputError as error:
+            if not isinstance(error.__cause__, ValueError):  # beyond the limits of any value
+                raise error.within(f"--set {name}") from None
+            tables = {}
+        options[name.strip()] = tables["value"] if tables.keys() == {"value"} else value.strip()
     return options
 
 
@@ -371,12 +437,15 @@ def _finite(value: Any) -> Any:
 
 
 def _mesh_or_shape(name: str) -> Mesh:
-    if name in shapes.names() and not Path(name).exists():
+    path = Path(name)
+    if name in shapes.names() and not path.exists():
         return shapes.make(name)
+    with suppress(OSError):  # there is none: the loader says so
+        check_regular(path, "a mesh file")
     return load_mesh(name)
 
 
-def _scene_info(scene: Scene) -> None:
+def _scene_info(scene: Scene, memory: int) -> None:
     camera, console = scene.camera, _console()
     console.print(f"camera: {camera.width} x {camera.height}, eye {list(camera.eye)}, fov_y {camera.fov_y}")
     kinds = [light.kind for light in scene.lights]
@@ -388,9 +457,11 @@ def _scene_info(scene: Scene) -> None:
         low, high = mesh.bounds
         size = np.linalg.norm(matrix[:3, :3], axis=0) * (high - low)
         source = entry.shape or (Path(entry.mesh).name if isinstance(entry.mesh, str) else "mesh")
-        row = (entry.name, source, str(len(mesh.faces)), "yes" if entry.is_reflector else "no")
+        row = (printable(entry.name), printable(source), str(len(mesh.faces)), "yes" if entry.is_reflector else "no")
         table.add_row(*row, " x ".join(f"{side:.3g}" for side in size))
     console.print(table)
+    allowed = budget.in_words(budget.memory_limit())
+    console.print(f"memory: about {budget.in_words(memory)} for its shapes, meshes and pictures, {allowed} allowed")
 
 
 def _mesh_info(mesh: Mesh) -> None:
