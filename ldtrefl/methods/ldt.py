@@ -121,7 +121,7 @@ class Ldt(Method):
             culled = self._culled(gbuffer, going, bounce, stats)
             # A mesh that is seen in reflections of reflections, too, gets the finest maps that the frame has asked for.
             for mesh, texels in self._resolutions(gbuffer, going, culled).items():
-                chosen[mesh] = max(texels, chosen.get(mesh, SMALLEST))
+                chosen[mesh] = max(texels, chosen.get(mesh, FEWEST_TEXELS))
             return culled
 
         def bind(needed: set[int]) -> BoundTracer:
