@@ -51,6 +51,7 @@ CASES: dict[str, tuple[Size, Size]] = {  # name of the module -> full and quick 
     "bounds": (Size(0, 1), Size(0, 7)),
     "cache_files": (Size(0, 150), Size(0, 12)),
     "histories": (Size(0, 12), Size(0, 1)),
+    "hostile": (Size(0, 1000), Size(0, 3)),
 }
 
 

@@ -30,6 +30,7 @@ from ldtrefl.ldt import (
     BINARY_STEPS,
     DEFAULT_QUALITY,
     DEFAULT_RESOLUTION,
+    FEWEST_TEXELS,
     LINEAR_STEPS,
     LayeredDepthTexture,
     Resolution,
