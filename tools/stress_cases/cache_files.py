@@ -1,4 +1,4 @@
-"""Case 14: files of the map cache that hash right and hold what no builder wrote, and things that are no files.
+"""Case 15: files of the map cache that hash right and hold what no builder wrote, and things that are no files.
 
 Every field of a file is set to what it cannot be, or some of its numbers are; then an object is peeled by a process
 that finds the file where its own would be, and its rays are traced. What cannot be true is refused with a warning and
@@ -32,7 +32,7 @@ from ldtrefl.ldt import peel_mesh
 
 from .judge import Outcome, rays_about
 
-NAME = "14 cache files"
+NAME = "15 cache files"
 SECONDS = 20
 BELIEVED, REFUSED, OTHER_ANSWERS, TRACEBACK, SILENT = 10, 11, 12, 70, 13
 """A child's exit status."""

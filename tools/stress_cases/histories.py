@@ -1,4 +1,4 @@
-"""Case 15: frames after moves, cameras and threads, against the same frames of new renderers: every bit the same.
+"""Case 16: frames after moves, cameras and threads, against the same frames of new renderers: every bit the same.
 
 A history is a scene, a method with options, and steps: an object is placed anew, or the camera moves, turns its ``up``
 or changes its size; after each a frame. A history's choices are made by ``pick``, which takes one of several values:
@@ -22,7 +22,7 @@ import ldtrefl
 
 from .judge import Outcome
 
-NAME = "15 histories"
+NAME = "16 histories"
 
 Pick = Callable[[Sequence[Any]], Any]
 

@@ -1,4 +1,4 @@
-"""Case 14: small inputs that ask for much, or that are not what they seem, each through the program in its own process.
+"""Case 17: small inputs that ask for much, or that are not what they seem, each through the program in its own process.
 
 Every one must end in the status that stands beside it, in time, with little memory, with at most one line on standard
 error, and with nothing left behind. Memory is the child's whole process, half a GiB of which is the program.
@@ -17,7 +17,7 @@ from pathlib import Path
 
 from .judge import Outcome
 
-NAME = "14 hostile inputs"
+NAME = "17 hostile inputs"
 SECONDS = 20
 """Five of the promise, the start of the program, and a machine that does other things too."""
 MEMORY = 1 << 30
