@@ -42,6 +42,7 @@ class ObjectRecord:
     """An object: its mesh, place and material."""
 
     vertices: wp.array(dtype=wp.vec3)  # unit space
+    exact_vertices: wp.array(dtype=wp.vec3d)  # the same in float64 if some lie far outside the bulk, else empty
     normals: wp.array(dtype=wp.vec3)  # unit space, not always of unit length, zero where undefined
     uvs: wp.array(dtype=wp.vec2)  # empty without texture coordinates
     faces: wp.array(dtype=wp.vec3i)
@@ -289,6 +290,7 @@ class DeviceScene:
         inverse = np.linalg.inv(device_from_unit)
         record = ObjectRecord()
         record.vertices, record.faces = geometry.vertices, geometry.faces
+        record.exact_vertices = geometry.exact_vertices
         record.device_from_unit = wp.mat44d(device_from_unit)
         record.unit_from_device = wp.mat44d(inverse)
         record.unit_from_direction = wp.mat33(inverse[:3, :3].astype(np.float32))

@@ -14,11 +14,12 @@ import numpy as np
 import warp as wp
 
 from ldtrefl import launch
-from ldtrefl.camera import Band, CameraView, camera_view
+from ldtrefl.camera import Band, CameraView, camera_ray, camera_view
 from ldtrefl.device_scene import DeviceScene, ObjectRecord
 from ldtrefl.raster import homogeneous_triangle, perspective_weights
 from ldtrefl.scene import Camera
 from ldtrefl.shade import Surface, surface_at
+from ldtrefl.unit_rays import unit_vertex
 from ldtrefl.vectors import as_double, from_to
 from ldtrefl.zbuffer import Drawing, homogeneous, object_of
 
@@ -27,6 +28,11 @@ BAND_PIXELS = 1 << 20
 
 BLOCK = 8
 """Pixels along a side of the blocks in which reflected rays stand; a band is a whole number of them high."""
+
+
+LARGE_OBJECT = wp.constant(64.0)
+"""Radii of an object in distances from the eye from which what a pixel sees of it is taken from the pixel's ray: the
+rounding of barycentrics is then a hundred-thousandth of the distance, a hundredth of a pixel."""
 
 
 @wp.struct
@@ -111,14 +117,55 @@ def pixel_view(gbuffer: GBufferView, objects: wp.array(dtype=ObjectRecord), pixe
         + v * objects[index].vertices[corners[2]]
     )
     position = wp.transform_point(objects[index].device_from_unit, as_double(point))
-    return wp.normalize(from_to(gbuffer.camera.eye, position))
+    offset = from_to(gbuffer.camera.eye, position)
+    if is_close_to_large(objects[index], wp.length(offset)):
+        offset = pixel_ray(gbuffer, pixel)
+    return wp.normalize(offset)
+
+
+@wp.func
+def pixel_ray(gbuffer: GBufferView, pixel: int) -> wp.vec3:
+    """Direction through a pixel's centre."""
+    width = gbuffer.camera.width
+    return camera_ray(gbuffer.camera, float(pixel % width) + 0.5, float(pixel / width) + 0.5)
+
+
+@wp.func
+def is_close_to_large(record: ObjectRecord, distance: float) -> bool:
+    """Whether an object is so large, for its distance from the eye, that float32 barycentrics do not tell where the
+    pixel sees it."""
+    return record.radius > LARGE_OBJECT * distance
+
+
+@wp.func
+def exact_corner(record: ObjectRecord, vertex: int) -> wp.vec3d:
+    """A vertex in device space."""
+    return wp.transform_point(record.device_from_unit, unit_vertex(record, vertex))
+
+
+@wp.func
+def point_on_ray(record: ObjectRecord, triangle: int, eye: wp.vec3d, ray: wp.vec3, otherwise: wp.vec3d) -> wp.vec3d:
+    """Where a ray from the eye meets the plane of a triangle, in float64; ``otherwise`` where it does not."""
+    corners = record.faces[triangle]
+    a = exact_corner(record, corners[0])
+    normal = wp.cross(exact_corner(record, corners[1]) - a, exact_corner(record, corners[2]) - a)
+    way = as_double(ray)
+    slope = wp.dot(normal, way)
+    if slope == wp.float64(0.0):
+        return otherwise
+    return eye + (wp.dot(normal, a - eye) / slope) * way
 
 
 @wp.func
 def pixel_surface(gbuffer: GBufferView, objects: wp.array(dtype=ObjectRecord), pixel: int, view: wp.vec3) -> Surface:
     """The surface that the pixel sees along unit direction ``view``."""
     uv = gbuffer.barycentrics[pixel]
-    return surface_at(objects, gbuffer.object[pixel], gbuffer.triangle[pixel], uv[0], uv[1], view)
+    index, triangle, eye = gbuffer.object[pixel], gbuffer.triangle[pixel], gbuffer.camera.eye
+    surface = surface_at(objects, index, triangle, uv[0], uv[1], view)
+    if is_close_to_large(objects[index], wp.length(from_to(eye, surface.position))):
+        ray = pixel_ray(gbuffer, pixel)
+        surface.position = point_on_ray(objects[index], triangle, eye, ray, surface.position)
+    return surface
 
 
 @dataclass(frozen=True, eq=False)

@@ -48,8 +48,13 @@ HEADER_FIRST = (
 UNPACKED_AT_ONCE = {"JPEG2000": 12}
 """Bytes a pixel that it takes to unpack others, which it may do when it opens them: 4 if not said here."""
 
-_AS_STORED = oiio.ImageSpec()
-_AS_STORED.attribute("oiio:UnassociatedAlpha", 1)  # or else colours come multiplied by alpha
+
+def _as_stored() -> oiio.ImageSpec:
+    """How pictures are opened: their colours not multiplied by alpha. Made each time: what a module keeps of
+    OpenImageIO's is reported as lost when the program ends."""
+    options = oiio.ImageSpec()
+    options.attribute("oiio:UnassociatedAlpha", 1)
+    return options
 
 
 def srgb_from_linear(linear: np.ndarray) -> np.ndarray:
@@ -117,7 +122,7 @@ def _read(path: Path) -> np.ndarray:
     _ask_for_unpacking(path)
     with caught_stderr():  # the formats' own libraries print what they find
         try:
-            reader = oiio.ImageInput.open(str(path), _AS_STORED)
+            reader = oiio.ImageInput.open(str(path), _as_stored())
             if reader is None:
                 oiio.geterror()
                 raise _unreadable(path)

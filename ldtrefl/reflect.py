@@ -35,7 +35,7 @@ from ldtrefl.shade import (
 from ldtrefl.skips import Skips
 from ldtrefl.strays import StrayHit, no_stray
 from ldtrefl.trace import Hit, Tracer, closest_hit_of, no_hit, occluded_of
-from ldtrefl.unit_rays import into_unit, leaving_point, unit_normal
+from ldtrefl.unit_rays import into_unit, start_above, start_above_own, unit_normal
 from ldtrefl.vectors import as_single, point_along
 
 BEYOND = wp.constant(1.000001)
@@ -217,16 +217,18 @@ def direct_radiance_of(tracer: Tracer) -> Any:
         distance: float,
     ) -> bool:
         own = surface.object
-        origin = leaving_point(objects[own], surface.triangle, surface.position, surface.facet)
-        rounded_origin = as_single(origin)
+        rounded_origin = as_single(surface.position)
         for k in range(objects.shape[0]):
             entry = sphere_entry(rounded_origin, towards, objects[k].centre, objects[k].radius)
             if entry >= 0.0 and entry < distance:
-                ray = into_unit(objects[k], origin, towards)
-                outwards = wp.vec3(0.0)
+                ray = into_unit(objects[k], surface.position, towards)
+                outwards = unit_normal(objects[k], surface.facet)
+                start = start_above(ray.start, outwards)
                 if k == own:
-                    outwards = unit_normal(objects[k], surface.facet)
-                if is_blocked(views, k, ray.start, ray.way, distance * ray.stretch, outwards):
+                    start = start_above_own(objects[k], surface.triangle, ray.start, outwards)
+                else:
+                    outwards = wp.vec3(0.0)
+                if is_blocked(views, k, start, ray.way, distance * ray.stretch, outwards):
                     return False
         return True
 

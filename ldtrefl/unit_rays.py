@@ -15,7 +15,7 @@ NEAR = wp.constant(wp.float64(8.0))
 """Unit space: distance from the middle beyond which a ray's way to the object is taken in float64."""
 
 LEAVING = wp.constant(wp.float64(1.0e-6))
-"""How far above its own triangle a ray leaves, relative to the coordinates there: 16 roundings of a float32. A point of
+"""How far above its own triangle a ray leaves, unit space: 16 roundings of a float32. A point of
 a triangle is off by three, and what tests it again by as many (Waechter and Binder 2019, "A Fast and Robust Method for
 Avoiding Self-Intersection")."""
 
@@ -71,26 +71,37 @@ def aimed_start(start: wp.vec3d, direction: wp.vec3, way: wp.vec3) -> wp.vec3d:
 
 
 @wp.func
-def leaving_point(record: ObjectRecord, triangle: int, point: wp.vec3d, outwards: wp.vec3) -> wp.vec3d:
-    """Where a ray starts that leaves an object's surface at a point of a triangle's plane, to the side of ``outwards``.
-
-    The point is put on the plane first: what met the ray may have left it a little off. All in device space.
-    """
-    corners = record.faces[triangle]
-    a, b, c = record.vertices[corners[0]], record.vertices[corners[1]], record.vertices[corners[2]]
-    across = wp.cross(b - a, c - a)
-    if across == wp.vec3(0.0):
-        return point
-    normal = wp.normalize(as_double(across))
-    if wp.dot(record.normal_from_unit * wp.normalize(across), outwards) < 0.0:
-        normal = -normal
-    start = wp.transform_point(record.unit_from_device, point)
-    largest = wp.max(wp.max(wp.max(wp.abs(a)), wp.max(wp.abs(b))), wp.max(wp.abs(c)))
-    height = LEAVING * wp.float64(largest) - wp.dot(normal, start - as_double(a))
-    return wp.transform_point(record.device_from_unit, start + height * normal)
+def unit_vertex(record: ObjectRecord, vertex: int) -> wp.vec3d:
+    """A vertex in unit space, as exactly as it is known."""
+    if record.exact_vertices.shape[0] > 0:
+        return record.exact_vertices[vertex]
+    return as_double(record.vertices[vertex])
 
 
 @wp.func
 def unit_normal(record: ObjectRecord, normal: wp.vec3) -> wp.vec3:
     """A normal of device space in the unit space of an object, unit."""
     return wp.normalize(as_single(wp.transform_vector(wp.transpose(record.device_from_unit), as_double(normal))))
+
+
+@wp.func
+def start_above(start: wp.vec3d, outwards: wp.vec3) -> wp.vec3d:
+    """Where a ray starts for an object that may touch the surface that it leaves to the side of ``outwards``: above it
+    by the rounding of that object's own coordinates. In its unit space."""
+    return start + LEAVING * as_double(outwards)
+
+
+@wp.func
+def start_above_own(record: ObjectRecord, triangle: int, start: wp.vec3d, outwards: wp.vec3) -> wp.vec3d:
+    """Where a ray starts for the object that it leaves: above the plane of its own triangle by the rounding of the
+    coordinates there. What met the ray may have left ``start`` a little off that plane. In unit space."""
+    corners = record.faces[triangle]
+    a = unit_vertex(record, corners[0])
+    across = wp.cross(unit_vertex(record, corners[1]) - a, unit_vertex(record, corners[2]) - a)
+    if across == wp.vec3d(wp.float64(0.0)):
+        return start
+    normal = wp.normalize(across)
+    if wp.dot(normal, as_double(outwards)) < wp.float64(0.0):
+        normal = -normal
+    # No coordinate of the bulk is larger than 1, and what lies outside is tested in float64.
+    return start + (LEAVING - wp.dot(normal, start - a)) * normal
