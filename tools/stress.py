@@ -52,6 +52,8 @@ CASES: dict[str, tuple[Size, Size]] = {  # name of the module -> full and quick 
     "cache_files": (Size(0, 150), Size(0, 12)),
     "histories": (Size(0, 12), Size(0, 1)),
     "hostile": (Size(0, 1000), Size(0, 3)),
+    "outliers": (Size(4000, 0), Size(200, 0)),
+    "shadows": (Size(0, 320), Size(0, 96)),
 }
 
 

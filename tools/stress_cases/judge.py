@@ -210,7 +210,7 @@ class Truth:
         # Start near the object: a float32 ray tracer cannot start far away, and brute force loses nothing.
         skipped = np.maximum(-(o * d).sum(axis=1) - 2.0, 0.0)
         o = o + skipped[:, None] * d
-        t, triangle = self._by_force(o, d) if self.is_brute else self._by_embree(o, d)
+        t, triangle = _against_all(self._a, self._u, self._v, o, d) if self.is_brute else self._by_embree(o, d)
         return (t + skipped) * self.half / length[:, 0], triangle
 
     def _by_embree(self, o: np.ndarray, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -219,27 +219,39 @@ class Truth:
         triangle = answer["primID"].astype(int)
         return np.where(triangle >= 0, answer["tfar"], np.inf).astype(float), triangle
 
-    def _by_force(self, o: np.ndarray, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        t, triangle = np.full(len(o), np.inf), np.full(len(o), -1)
-        if not len(self._a):
-            return t, triangle
-        step = max(1, 1_000_000 // len(self._a))
-        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            for first in range(0, len(o), step):
-                rays = slice(first, first + step)
-                p = np.cross(d[rays, None], self._v)
-                determinant = (p * self._u).sum(axis=2)
-                s = o[rays, None] - self._a
-                u = (s * p).sum(axis=2) / determinant
-                q = np.cross(s, self._u)
-                v = (q * d[rays, None]).sum(axis=2) / determinant
-                along = (q * self._v).sum(axis=2) / determinant
-                inside = (u >= 0) & (v >= 0) & (u + v <= 1) & (along >= 0) & np.isfinite(along)
-                along = np.where(inside, along, np.inf)
-                nearest = along.argmin(axis=1)
-                t[rays] = along[np.arange(len(nearest)), nearest]
-                triangle[rays] = np.where(np.isfinite(t[rays]), nearest, -1)
+
+def brute_force(mesh: ldtrefl.Mesh, origins: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """First hits of rays where they stand: (n,) distances in lengths of each direction, +inf on a miss, and (n,)
+    triangles, -1 on a miss."""
+    corners = mesh.vertices[mesh.faces]
+    a, u, v = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    return _against_all(a, u, v, origins.astype(float), directions.astype(float))
+
+
+def _against_all(
+    a: np.ndarray, edge_u: np.ndarray, edge_v: np.ndarray, o: np.ndarray, d: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Every ray against every triangle, given by a corner and the edges from it."""
+    t, triangle = np.full(len(o), np.inf), np.full(len(o), -1)
+    if not len(a):
         return t, triangle
+    step = max(1, 1_000_000 // len(a))
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        for first in range(0, len(o), step):
+            rays = slice(first, first + step)
+            p = np.cross(d[rays, None], edge_v)
+            determinant = (p * edge_u).sum(axis=2)
+            s = o[rays, None] - a
+            u = (s * p).sum(axis=2) / determinant
+            q = np.cross(s, edge_u)
+            v = (q * d[rays, None]).sum(axis=2) / determinant
+            along = (q * edge_v).sum(axis=2) / determinant
+            inside = (u >= 0) & (v >= 0) & (u + v <= 1) & (along >= 0) & np.isfinite(along)
+            along = np.where(inside, along, np.inf)
+            nearest = along.argmin(axis=1)
+            t[rays] = along[np.arange(len(nearest)), nearest]
+            triangle[rays] = np.where(np.isfinite(t[rays]), nearest, -1)
+    return t, triangle
 
 
 def tracers(mesh: ldtrefl.Mesh, resolution: int = TEXELS, **options: int) -> Iterator[tuple[str, Callable]]:
