@@ -416,11 +416,11 @@ def _errors(frame: Frame, truth: Frame, renderer: Renderer, resolution: int) -> 
 
 def _error_table(rows: dict[str, dict[str, Any]], title: str) -> Table:
     table = Table(title=title)
-    heads = ["method", "seconds", "stages", "SSIM", "PSNR", "FLIP", "wrong hit %", "wrong miss %"]
+    heads = ["method", "seconds", "stages", "SSIM", "PSNR", "FLIP", "wrong hit %", "wrong miss %", "wrong object %"]
     heads += ["texels p50", "p99", "pixels p99"]
     for head in heads:
         table.add_column(head, justify="left" if head in ("method", "stages") else "right", overflow="fold")
-    formats = {"ssim": ".4f", "psnr": ".1f", "flip": ".4f", "wrong_hits": ".3f", "wrong_misses": ".3f"}
+    formats = {"ssim": ".4f", "psnr": ".1f", "flip": ".4f", "wrong_hits": ".3f", "wrong_misses": ".3f", "wrong_objects": ".3f"}
     formats |= {"median": ".3f", "p99": ".2f", "pixels": ".3f"}
     for name, row in rows.items():
         stages = " ".join(f"{stage} {seconds:.3f}" for stage, seconds in row["seconds"].items())

@@ -144,6 +144,16 @@ def test_fresnel_follows_schlick() -> None:
     np.testing.assert_allclose(image, 0.04 + 0.96 * (1 - np.cos(angle)) ** 5, rtol=1e-4)
 
 
+@pytest.mark.parametrize("method", ["bvh", "ldt", "envmap"])
+def test_an_eye_in_a_mirrors_surface_sees_a_finite_picture(method: str) -> None:
+    """There is no direction from the eye to what it touches."""
+    for shape, eye in (("sphere", (0, 0, 1)), ("plane", (0, 0, 0)), ("box", (1, 1, 1))):
+        camera = Camera(eye=eye, look_at=(0, 0.1, -2), width=9, height=9)
+        objects = (Object(shape=shape, material=MIRROR), Object(shape="box", translate=(3, 0, 0)))
+        frame = ldtrefl.render(Scene(camera=camera, objects=objects), method)
+        assert np.isfinite(frame.image).all() and np.isfinite(frame.reflection).all()
+
+
 @pytest.mark.parametrize("method", ["bvh", "ldt"])
 def test_facing_mirrors_bounce(method: str) -> None:
     """Two mirrors and an emitter seen after two reflections: reflectance squared times emission."""

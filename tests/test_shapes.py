@@ -71,11 +71,11 @@ def test_segments_set_the_count() -> None:
     [
         ("spher", {}, "unknown shape 'spher'; did you mean 'sphere'"),
         ("sphere", {"segment": 4}, "unknown key 'segment'; did you mean 'segments'"),
-        ("torus", {"minor": "x"}, "^minor: should be a valid number, got 'x'"),
-        ("torus", {"minor": -0.5}, r"^minor: should be greater than 0, got -0\.5"),
-        ("box", {"segments": 10**9}, "^segments: should be less than or equal to 4096, got 1000000000"),
-        ("bowl", {"closed": 1}, "^closed: should be a valid boolean, got 1"),
-        ("genus3", {"grid": float("nan")}, "^grid: should be a valid integer, got nan"),
+        ("torus", {"minor": "x"}, "^params: minor: should be a valid number, got 'x'"),
+        ("torus", {"minor": -0.5}, r"^params: minor: should be greater than 0, got -0\.5"),
+        ("box", {"segments": 10**9}, "^params: segments: should be less than or equal to 4096, got 1000000000"),
+        ("bowl", {"closed": 1}, "^params: closed: should be a valid boolean, got 1"),
+        ("genus3", {"grid": float("nan")}, "^params: grid: should be a valid integer, got nan"),
     ],
 )
 def test_wrong_parameters(name: str, params: dict, message: str) -> None:

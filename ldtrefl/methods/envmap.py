@@ -53,7 +53,8 @@ def look_up(cube: wp.array(dtype=wp.vec3), resolution: int, direction: wp.vec3) 
     forward[face / 2] = wp.where(face % 2 == 0, 1.0, -1.0)
     up = wp.where(face >= 4, wp.vec3(0.0, 1.0, 0.0), wp.vec3(0.0, 0.0, 1.0))
     right = wp.cross(forward, up)
-    depth = wp.dot(direction, forward)
+    # A unit vector points to its face at 0.577 or more; what the eye touches has no direction at all.
+    depth = wp.max(wp.dot(direction, forward), 0.5)
     x = 0.5 * float(resolution) * (wp.dot(direction, right) / depth + 1.0) - 0.5
     y = 0.5 * float(resolution) * (1.0 - wp.dot(direction, up) / depth) - 0.5
     last = resolution - 1

@@ -20,6 +20,9 @@ from ldtrefl.image import load_image
 from .judge import Outcome
 
 NAME = "13 kills"
+STARTING = 0.02
+"""Seconds that a forked child may take before it writes."""
+
 FOUND = 0.2
 """Share of the kills after which a file must be there: where none ever is, none is ever looked at."""
 
@@ -75,7 +78,7 @@ def run(rays: int, pictures: int) -> list[Outcome]:
                     finally:
                         os._exit(1)
                 # While it writes for the first time, or over what it has written before.
-                time.sleep(float(generator.uniform(0.0, 3.0 * seconds)))
+                time.sleep(float(generator.uniform(0.0, STARTING + 3.0 * seconds)))
                 os.kill(child, signal.SIGKILL)
                 os.waitpid(child, 0)
                 outcome.tried += 1
