@@ -5,9 +5,9 @@ allocate what a file asks for first *takes* that many bytes from the account in 
 so that what its files need adds up; outside one, every request stands alone.
 
 The promise for files that nobody has looked at (``SECURITY.md`` has the table by kind of file): loading and rendering
-take no more than the limit, half a gigabyte for the program itself, and what the pixels of the camera need. The limit
-is 4 GiB; the environment variable ``LDTREFL_MEMORY``, ``--memory`` and :func:`set_memory_limit` set another. Estimates
-are peaks that were measured, so that what is taken counts what rendering adds to loading.
+take no more than the limit, and half a gigabyte for the program itself. The limit is 4 GiB; the environment variable
+``LDTREFL_MEMORY``, ``--memory`` and :func:`set_memory_limit` set another. Estimates are peaks that were measured, so
+that what is taken counts what rendering adds to loading.
 """
 
 from __future__ import annotations

@@ -131,7 +131,7 @@ def render(
     path = check_writable(output or Path(scene.stem + ".png"))
     if cache is not None and no_cache:
         raise InputError("--cache and --no-cache exclude each other")
-    with _maps_kept(cache, no_cache):
+    with _maps_kept(cache, no_cache), budget.account():
         loaded = load_scene(scene)
         with _progress():
             frame = Renderer(loaded, method, device, **_options(settings)).render()
@@ -420,7 +420,14 @@ def _error_table(rows: dict[str, dict[str, Any]], title: str) -> Table:
     heads += ["texels p50", "p99", "pixels p99"]
     for head in heads:
         table.add_column(head, justify="left" if head in ("method", "stages") else "right", overflow="fold")
-    formats = {"ssim": ".4f", "psnr": ".1f", "flip": ".4f", "wrong_hits": ".3f", "wrong_misses": ".3f", "wrong_objects": ".3f"}
+    formats = {
+        "ssim": ".4f",
+        "psnr": ".1f",
+        "flip": ".4f",
+        "wrong_hits": ".3f",
+        "wrong_misses": ".3f",
+        "wrong_objects": ".3f",
+    }
     formats |= {"median": ".3f", "p99": ".2f", "pixels": ".3f"}
     for name, row in rows.items():
         stages = " ".join(f"{stage} {seconds:.3f}" for stage, seconds in row["seconds"].items())

@@ -31,8 +31,8 @@ Flag = Annotated[bool, Field(strict=True)]
 
 # Bytes at the peak of making and rendering, by tools/stress_cases/hostile.py's measure: process size over what the
 # process has without the shape.
-MADE_NORMALS_BYTES = 600
-"""A triangle, where vertex normals are made from the triangles; 200 of them are the device's arrays and the grid."""
+MADE_NORMALS_BYTES = 300
+"""A triangle, where vertex normals are made from the triangles."""
 KNOWN_NORMALS_BYTES = 250
 """A triangle, where they are not."""
 CELL_BYTES = 60
