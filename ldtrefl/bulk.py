@@ -19,6 +19,9 @@ FAR_LARGER = 32.0
 """Times that the whole box must be longer than the samples' for strays to be told apart: float32 then still resolves
 four millionths of the bulk without."""
 
+FARTHEST = 1e12
+"""Times from which the bulk is too small to be seen beside its outliers: a coordinate is damaged."""
+
 REACH = 2.0
 """Of the samples' longest side, how far from their middle the bulk may go on along each axis."""
 
@@ -39,7 +42,7 @@ def stray_triangles(vertices: np.ndarray, faces: np.ndarray, bounds: np.ndarray)
     tail = int(TAIL * len(sampled))
     low, high = sampled[tail], sampled[-1 - tail]
     side, longest = float((high - low).max()), float((bounds[1] - bounds[0]).max())
-    if not 0.0 < FAR_LARGER * side < longest:
+    if not 0.0 < FAR_LARGER * side < longest < FARTHEST * side:
         return none
     outside = (np.abs(vertices - (low + (high - low) / 2.0)) > REACH * side).any(axis=1)
     strays = np.flatnonzero(outside[faces].any(axis=1))

@@ -27,6 +27,9 @@ from ldtrefl.strays import stray_array
 MOST_NUMBERS = (1 << 31) - 1
 """Triangles and vertices of all objects together: they are numbered by int32."""
 
+MOST_DOUBLINGS = 120
+"""Of a power of two in float32, up or down."""
+
 SPHERE_PADDING = 2.0e-6
 """Device units by which bounding spheres are widened: ten roundings of a float32 anywhere in the device's box."""
 
@@ -48,7 +51,8 @@ class ObjectRecord:
     faces: wp.array(dtype=wp.vec3i)
     device_from_unit: wp.mat44d
     unit_from_device: wp.mat44d
-    unit_from_direction: wp.mat33  # the linear part of unit_from_device
+    unit_from_direction: wp.mat33  # the linear part of unit_from_device, over unit_per_device
+    unit_per_device: float  # a power of two, so that squares stay in float32's range however small the object is
     normal_from_unit: wp.mat33  # inverse transpose of device_from_unit's linear part
     centre: wp.vec3  # bounding sphere, device space
     radius: float
@@ -293,7 +297,9 @@ class DeviceScene:
         record.exact_vertices = geometry.exact_vertices
         record.device_from_unit = wp.mat44d(device_from_unit)
         record.unit_from_device = wp.mat44d(inverse)
-        record.unit_from_direction = wp.mat33(inverse[:3, :3].astype(np.float32))
+        exponent = int(np.clip(np.frexp(np.abs(inverse[:3, :3]).max())[1], -MOST_DOUBLINGS, MOST_DOUBLINGS))
+        record.unit_per_device = float(np.ldexp(1.0, exponent))
+        record.unit_from_direction = wp.mat33(np.ldexp(inverse[:3, :3], -exponent).astype(np.float32))
         normal_from_unit = inverse[:3, :3].T / np.abs(inverse[:3, :3]).max()
         record.normal_from_unit = wp.mat33(normal_from_unit.astype(np.float32))
         record.centre, record.radius = _bounding_sphere(geometry.mesh, device_from_unit)

@@ -27,6 +27,30 @@ CHUNK = 1 << 24
 """Bytes that are unpacked at a time."""
 
 
+class _FilesBeside(resolvers.FilePathResolver):
+    """The files of a mesh file's folder: plain ones, in memory that was asked for first."""
+
+    def get(self, name: str) -> bytes:
+        """The bytes of a file.
+
+        Raises:
+            InputError: it is a pipe, a device or a folder, or too large.
+            FileNotFoundError, ValueError: there is none, or it is not in the folder.
+        """
+        for candidate in (name.strip(), name.strip().lstrip("/"), Path(name).name):
+            try:
+                path = self.absolute(candidate)
+            except ValueError:
+                continue
+            if path.exists():
+                if not path.is_file():
+                    raise InputError(f"'{candidate}' beside it is not a file")
+                budget.take(path.stat().st_size, f"'{candidate}' beside it")
+                return path.read_bytes()
+        self.absolute(name)
+        raise FileNotFoundError(name)
+
+
 def archive_kind(path: str | Path) -> str | None:
     """How the file's name ends, if it is an archive's."""
     return next((ending for ending in ARCHIVES if str(path).lower().endswith(ending)), None)
@@ -41,7 +65,7 @@ def mesh_files(path: str) -> Iterator[tuple[bytes, str, Any]]:
     kind = archive_kind(path)
     if kind is None:
         budget.take(Path(path).stat().st_size, "the file")
-        yield Path(path).read_bytes(), _kind(path), resolvers.FilePathResolver(path)
+        yield Path(path).read_bytes(), _kind(path), _FilesBeside(path)
         return
     members = {".zip": _of_zip, ".bz2": _of_bz2}.get(kind, _of_tar)(path)
     beside = resolvers.ZipResolver({name: io.BytesIO(data) for name, data in members.items()})

@@ -11,6 +11,7 @@ Nothing is unpacked or read before the memory that it may take is asked for (``b
 from __future__ import annotations
 
 import io
+import logging
 import stat
 import weakref
 from dataclasses import dataclass
@@ -31,8 +32,11 @@ from ldtrefl.normals import split_by_side
 from ldtrefl.pillow_limit import no_pixel_limit
 from ldtrefl.pillow_pictures import picture_of, stored_from_pillow, take_pictures
 from ldtrefl.polygons import triangles_of
+from ldtrefl.reader_words import words_of_reader
 from ldtrefl.sharing import shared_while_used
 from ldtrefl.welding import first_of_equals
+
+_log = logging.getLogger("ldtrefl")
 
 UNIT = 1e-3
 """How far from 1 the length of a stored normal may be; others are made unit vectors."""
@@ -96,7 +100,12 @@ def _load_mesh(path: str, _modified: int, _size: int) -> Mesh:
             for data, kind, beside in mesh_files(path):
                 needed = reading_bytes(data, kind)
                 budget.take(needed, f"reading it as {kind}")
-                pieces += _pieces(data, kind, beside)
+                with words_of_reader() as words:
+                    pieces += _pieces(data, kind, beside)
+                if words and kind.startswith("stl"):
+                    raise InputError(f"not a mesh that can be read ({words[0]})")
+                for line in words:
+                    _log.warning("%s: %s", path, " ".join(line.split()))
                 asked += needed
             if not pieces:
                 raise InputError("the mesh has no triangles")

@@ -34,8 +34,9 @@ def into_unit(record: ObjectRecord, origin: wp.vec3d, direction: wp.vec3) -> Uni
     """A ray of device space in the unit space of an object."""
     ray = UnitRay()
     way = record.unit_from_direction * direction
-    ray.stretch = wp.length(way)
-    ray.way = way / ray.stretch
+    length = wp.length(way)
+    ray.stretch = length * record.unit_per_device
+    ray.way = way / length
     ray.start = wp.transform_point(record.unit_from_device, origin)
     return ray
 

@@ -39,6 +39,7 @@ BOTTOM_TO_TOP = (
     "mesh_polygons",
     "mesh_memory",
     "mesh_archives",
+    "reader_words",
     "mesh_files",
     "teapot_patches",
     "shapes",

@@ -3,6 +3,7 @@
 import bz2
 import gzip
 import io
+import os
 import tarfile
 import zipfile
 from pathlib import Path
@@ -13,7 +14,7 @@ import trimesh
 from PIL import Image
 
 import ldtrefl
-from ldtrefl import budget
+from ldtrefl import InputError, budget
 
 from .mesh_writers import write_glb, write_ply
 
@@ -334,3 +335,27 @@ def test_vertices_that_are_not_finite_are_refused_used_or_not(tmp_path: Path) ->
     (tmp_path / "b.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n")
     with pytest.raises(ldtrefl.InputError, match=r"b\.obj"):
         ldtrefl.load_mesh(tmp_path / "b.obj")
+
+
+def test_files_beside_a_mesh_are_plain_files(tmp_path: Path) -> None:
+    """A pipe, a folder or a device in place of a glTF's buffer is a line, and nobody waits for a writer."""
+    trimesh.creation.icosphere(1).export(tmp_path / "ball.gltf")
+    buffer = next(path for path in tmp_path.iterdir() if path.suffix == ".bin")
+    buffer.unlink()
+    os.mkfifo(buffer)
+    with pytest.raises(InputError, match=rf"ball\.gltf: .*'{buffer.name}' beside it is not a file"):
+        ldtrefl.load_mesh(tmp_path / "ball.gltf")
+    buffer.unlink()
+    buffer.mkdir()
+    with pytest.raises(InputError, match=rf"ball\.gltf: .*'{buffer.name}' beside it is not a file"):
+        ldtrefl.load_mesh(tmp_path / "ball.gltf")
+
+
+def test_what_the_reader_says_is_no_traceback(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """trimesh logs that normals of a text STL cannot be read, with a traceback that Python prints."""
+    trimesh.creation.icosphere(0).export(tmp_path / "ball.stl", file_type="stl_ascii")
+    text = (tmp_path / "ball.stl").read_text().replace("facet normal ", "facet normal x", 1)
+    (tmp_path / "ball.stl").write_text(text)
+    with pytest.raises(InputError, match=r"ball\.stl: not a mesh that can be read \(failed to extract face_normals"):
+        ldtrefl.load_mesh(tmp_path / "ball.stl")
+    assert capfd.readouterr().err == ""

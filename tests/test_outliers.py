@@ -77,3 +77,20 @@ def test_more_triangles_than_an_int32_numbers_are_refused(monkeypatch: pytest.Mo
     ldtrefl.render(ldtrefl.Scene(camera=camera, objects=boxes[:4]))
     with pytest.raises(ldtrefl.InputError, match="the objects have more than 100 vertices, instances counted in"):
         ldtrefl.render(ldtrefl.Scene(camera=camera, objects=boxes))
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("size", [1e9, 1e20, 1e38, 1e90])
+def test_a_bulk_too_small_to_be_seen_is_no_trouble(size: float) -> None:
+    """A damaged coordinate makes the mesh's box so large that the rest of it is less than float32 has numbers for."""
+    mesh = outliers.with_outlier("beside", size)
+    camera = ldtrefl.Camera(eye=(0, -5, 1), look_at=(0, 0, 0), width=16, height=16)
+    ball = ldtrefl.Object(shape="sphere", params={"segments": [16, 8]}, material=ldtrefl.Material(mirror=0.9))
+    thing = ldtrefl.Object(mesh=mesh, fit=2.0, translate=(1.5, 0, 0))
+    lit = {
+        "lighting": ldtrefl.Lighting(shadows=True),
+        "lights": (ldtrefl.Light(kind="point", position=(0, -3, 3), intensity=4),),
+    }
+    scene = ldtrefl.Scene(camera=camera, objects=(ball, thing), **lit)
+    for method in ("ldt", "bvh"):
+        assert np.isfinite(ldtrefl.render(scene, method).image).all()

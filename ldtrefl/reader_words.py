@@ -1,0 +1,33 @@
+"""What trimesh says while it reads a file: it would print it, tracebacks too, where a program has set up no logging."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+
+class _Collector(logging.Handler):
+    """Keeps what one thread is told."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.WARNING)
+        self.lines: list[str] = []
+        self._thread = threading.get_ident()
+
+    def emit(self, record: logging.LogRecord) -> None:
+        if record.thread == self._thread:
+            cause = record.exc_info[1] if record.exc_info else None
+            self.lines.append(record.getMessage() + (f" ({cause})" if cause else ""))
+
+
+@contextmanager
+def words_of_reader() -> Iterator[list[str]]:
+    """The warnings that trimesh gives in this thread inside this block, a line each."""
+    log, collector = logging.getLogger("trimesh"), _Collector()
+    log.addHandler(collector)
+    try:
+        yield collector.lines
+    finally:
+        log.removeHandler(collector)
