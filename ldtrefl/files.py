@@ -21,7 +21,7 @@ LONGEST_STEM = 32
 def written_whole(path: str | Path, *, private: bool = False) -> Iterator[Path]:
     """A file beside ``path``, with its ending, that takes its place at the end of this block, or is gone.
 
-    A link is followed: its target is replaced. A file that is there already keeps its permissions, and its owner if
+    A link is followed: its target is replaced, but in a cache the link itself. A file that is there already keeps its permissions, and its owner if
     that can be. The data are on the disk before the file takes its place.
 
     Args:
@@ -31,7 +31,7 @@ def written_whole(path: str | Path, *, private: bool = False) -> Iterator[Path]:
     Raises:
         InputError: it cannot be written.
     """
-    target = replaceable(path)
+    target = Path(path) if private else replaceable(path)
     scratch = None
     try:
         scratch = _new_file_beside(target, 0o600 if private else 0o666)

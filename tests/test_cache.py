@@ -435,3 +435,20 @@ def test_an_archive_that_unpacks_to_more_than_is_allowed(tmp_path: Path) -> None
             ldtrefl.LayeredDepthTexture.load(tmp_path / "c.npz")
     finally:
         budget.set_memory_limit()
+
+
+@pytest.mark.parametrize("kind", ["link", "dangling link", "pipe"])
+def test_what_stands_in_a_files_place_is_replaced_and_not_written_through(cache: MapCache, kind: str) -> None:
+    """A link in the cache's folder leads nowhere: its target keeps its bytes, or stays absent."""
+    elsewhere = cache.folder.parent / "elsewhere"
+    if kind == "link":
+        elsewhere.write_bytes(b"mine")
+    place = cache.path("a" * 32)
+    if kind == "pipe":
+        os.mkfifo(place)
+    else:
+        place.symlink_to(elsewhere)
+    assert cache.load("a" * 32) is None
+    cache.store("a" * 32, {"x": np.arange(5, dtype=np.int32)}, {})
+    assert not place.is_symlink() and place.is_file() and cache.load("a" * 32) is not None
+    assert elsewhere.read_bytes() == b"mine" if kind == "link" else not elsewhere.exists()
