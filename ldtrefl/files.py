@@ -21,8 +21,8 @@ LONGEST_STEM = 32
 def written_whole(path: str | Path, *, private: bool = False) -> Iterator[Path]:
     """A file beside ``path``, with its ending, that takes its place at the end of this block, or is gone.
 
-    A link is followed: its target is replaced, but in a cache the link itself. A file that is there already keeps its permissions, and its owner if
-    that can be. The data are on the disk before the file takes its place.
+    A link is followed: its target is replaced, but in a cache the link itself. A file that is there already keeps its
+    permissions, and its owner if that can be. The data are on the disk before the file takes its place.
 
     Args:
         path: where the file shall be.
