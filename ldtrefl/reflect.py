@@ -184,8 +184,12 @@ def closest_hits_kernel(tracer: Tracer, bounds: bool = True) -> wp.Kernel:
                 steps += hit.steps
                 searches += 1
                 t = hit.t / ray.stretch
+                is_met = hit.triangle >= 0
+                if to_infinity and is_met:
+                    # Coarse patches may rise out of the sphere, where a search by bounds does not look.
+                    is_met = meets_sphere(rounded_origin, direction, objects[k].centre, objects[k].radius)
                 # Of two in one place the first counts, in whatever order they are met.
-                if hit.triangle >= 0 and (t < nearest.t or (t == nearest.t and k < nearest.object)):
+                if is_met and (t < nearest.t or (t == nearest.t and k < nearest.object)):
                     nearest.t = t
                     nearest.object = k
                     nearest.triangle = hit.triangle

@@ -493,3 +493,28 @@ def test_many_small_objects_are_drawn_like_one_mesh() -> None:
     number = np.where(seen[1].objects >= 0, seen[1].objects * len(box.faces) + seen[1].triangles, -1)
     # Corners are rounded to float32 in a box of another size: pixels on an edge may go to either side.
     assert (number != seen[0].triangles).mean() < 0.002
+
+
+@pytest.mark.parametrize("shadows", [False, True])
+def test_coarse_maps_hide_nothing_from_the_search_by_bounds(shadows: bool) -> None:
+    """Patches of coarse maps rise out of the sphere about their object: no skip may show what another hides."""
+    rng = np.random.default_rng(4)
+    dense = (("sphere", (400, 200)), ("torus_knot", (400, 40)), ("torus", (300, 100)))
+    for error in (1.0, 8.0, 32.0):
+        things = tuple(
+            Object(
+                shape=shape,
+                params={"segments": segments},
+                scale=float(rng.uniform(0.2, 0.6)),
+                translate=tuple((rng.uniform(-1.8, 1.8, 3) - [0, 1, 0]).tolist()),
+            )
+            for shape, segments in dense
+        )
+        mirrors = (
+            Object(shape="sphere", material=MIRROR),
+            Object(shape="sphere", scale=0.5, translate=(1.6, 0.3, 0.2), material=MIRROR),
+        )
+        seen = scene(objects=(*mirrors, *things), lighting=Lighting(shadows=shadows))
+        frames = [ldtrefl.render(seen, "ldt", error=error, skip=skip) for skip in ("all", "none", "bounds", "regions")]
+        for other in frames[1:]:
+            np.testing.assert_array_equal(frames[0].image, other.image)

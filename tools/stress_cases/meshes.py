@@ -14,8 +14,10 @@ NEEDLES = limits(
     Limit(
         wrong=60.0,
         p99=np.inf,
+        defects=0.1,
         place=np.inf,
-        why="aimed at what is a millionth wide: hit or miss is chance, and so are barycentrics of a rounded place",
+        why="aimed at what is a millionth wide: hit or miss is chance, and so are barycentrics of a rounded place, and "
+        "of a hundred rays moved aside none may meet it",
     ),
     linear=linear_limit(100.0, "thinner than a texel: finite answers alone"),
 )
