@@ -105,9 +105,17 @@ def find_surfaces(
         normal_out[i] = surface.normal
 
 
+@wp.struct
+class PixelView:
+    """The line of sight of a pixel."""
+
+    direction: wp.vec3  # from the eye to what the pixel sees, unit; 0 if the eye touches it
+    is_close_to_large: bool  # the object is so large for its distance that barycentrics do not tell where it is seen
+
+
 @wp.func
-def pixel_view(gbuffer: GBufferView, objects: wp.array(dtype=ObjectRecord), pixel: int) -> wp.vec3:
-    """Unit direction from the eye to what the pixel sees."""
+def pixel_view(gbuffer: GBufferView, objects: wp.array(dtype=ObjectRecord), pixel: int) -> PixelView:
+    """How a pixel sees what it sees."""
     index = gbuffer.object[pixel]
     corners = objects[index].faces[gbuffer.triangle[pixel]]
     u, v = gbuffer.barycentrics[pixel][0], gbuffer.barycentrics[pixel][1]
@@ -118,9 +126,15 @@ def pixel_view(gbuffer: GBufferView, objects: wp.array(dtype=ObjectRecord), pixe
     )
     position = wp.transform_point(objects[index].device_from_unit, as_double(point))
     offset = from_to(gbuffer.camera.eye, position)
-    if is_close_to_large(objects[index], wp.length(offset)):
+    distance = wp.length(offset)
+    view = PixelView()
+    view.is_close_to_large = objects[index].radius > LARGE_OBJECT * distance
+    if view.is_close_to_large:
         offset = pixel_ray(gbuffer, pixel)
-    return wp.normalize(offset)
+        distance = wp.length(offset)
+    if distance > 0.0:
+        view.direction = offset / distance
+    return view
 
 
 @wp.func
@@ -128,13 +142,6 @@ def pixel_ray(gbuffer: GBufferView, pixel: int) -> wp.vec3:
     """Direction through a pixel's centre."""
     width = gbuffer.camera.width
     return camera_ray(gbuffer.camera, float(pixel % width) + 0.5, float(pixel / width) + 0.5)
-
-
-@wp.func
-def is_close_to_large(record: ObjectRecord, distance: float) -> bool:
-    """Whether an object is so large, for its distance from the eye, that float32 barycentrics do not tell where the
-    pixel sees it."""
-    return record.radius > LARGE_OBJECT * distance
 
 
 @wp.func
@@ -157,12 +164,12 @@ def point_on_ray(record: ObjectRecord, triangle: int, eye: wp.vec3d, ray: wp.vec
 
 
 @wp.func
-def pixel_surface(gbuffer: GBufferView, objects: wp.array(dtype=ObjectRecord), pixel: int, view: wp.vec3) -> Surface:
-    """The surface that the pixel sees along unit direction ``view``."""
+def pixel_surface(gbuffer: GBufferView, objects: wp.array(dtype=ObjectRecord), pixel: int, view: PixelView) -> Surface:
+    """The surface that the pixel sees."""
     uv = gbuffer.barycentrics[pixel]
     index, triangle, eye = gbuffer.object[pixel], gbuffer.triangle[pixel], gbuffer.camera.eye
-    surface = surface_at(objects, index, triangle, uv[0], uv[1], view)
-    if is_close_to_large(objects[index], wp.length(from_to(eye, surface.position))):
+    surface = surface_at(objects, index, triangle, uv[0], uv[1], view.direction)
+    if view.is_close_to_large:
         ray = pixel_ray(gbuffer, pixel)
         surface.position = point_on_ray(objects[index], triangle, eye, ray, surface.position)
     return surface

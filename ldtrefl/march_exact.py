@@ -171,4 +171,10 @@ def stray_hit_exact(
     return first_stray(views[index].strays, origin, direction, t_max)
 
 
-EXACT = Tracer("exact", GridView, closest_hit_exact, occluded_exact, stray_hit_exact)
+@wp.func
+def stray_count_exact(views: wp.array(dtype=GridView), index: int) -> int:
+    """The tracer's ``stray_count``."""
+    return views[index].strays.shape[0]
+
+
+EXACT = Tracer("exact", GridView, closest_hit_exact, occluded_exact, stray_hit_exact, stray_count_exact)

@@ -213,4 +213,10 @@ def no_stray_linear(
     return no_stray()
 
 
-LINEAR = Tracer("linear", LdtView, closest_hit_linear, occluded_linear, no_stray_linear)
+@wp.func
+def stray_count_linear(views: wp.array(dtype=LdtView), index: int) -> int:
+    """The tracer's ``stray_count``."""
+    return 0
+
+
+LINEAR = Tracer("linear", LdtView, closest_hit_linear, occluded_linear, no_stray_linear, stray_count_linear)

@@ -58,7 +58,13 @@ def stray_hit_bvh(
     return first_stray(views[index].strays, origin, direction, t_max)
 
 
-BVH = Tracer("bvh", BvhView, closest_hit_bvh, occluded_bvh, stray_hit_bvh)
+@wp.func
+def stray_count_bvh(views: wp.array(dtype=BvhView), index: int) -> int:
+    """The tracer's ``stray_count``."""
+    return views[index].strays.shape[0]
+
+
+BVH = Tracer("bvh", BvhView, closest_hit_bvh, occluded_bvh, stray_hit_bvh, stray_count_bvh)
 
 
 class Raycaster:

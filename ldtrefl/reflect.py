@@ -79,7 +79,13 @@ def never_stray(
     return no_stray()
 
 
-NOTHING = Tracer("nothing", NoView, never_hit, never_occluded, never_stray)
+@wp.func
+def nothing_strays(views: wp.array(dtype=NoView), index: int) -> int:
+    """``stray_count`` of a tracer that sees nothing."""
+    return 0
+
+
+NOTHING = Tracer("nothing", NoView, never_hit, never_occluded, never_stray, nothing_strays)
 """The tracer of scenes without shadows: kernels built from it hold no shadow rays."""
 
 
@@ -180,7 +186,7 @@ def closest_hits_kernel(tracer: Tracer, bounds: bool = True) -> wp.Kernel:
                 # t stays in device units: divide by the direction's length in unit space.
                 ray = into_unit(objects[k], origin, direction)
                 t_max = wp.where(to_infinity, wp.inf, BEYOND * nearest.t * ray.stretch)
-                hit = closest(views, k, ray.start, ray.way, t_max)
+                hit = closest(views, k, ray.start, ray.way, ray.way, t_max)
                 steps += hit.steps
                 searches += 1
                 t = hit.t / ray.stretch
@@ -302,7 +308,7 @@ def shade_reflectors_kernel(tracer: Tracer) -> wp.Kernel:
         radiance_out[pixel] = direct_radiance(views, objects, lighting, surface)
         mirror_out[i] = surface.mirror
         rays.origin[i] = surface.position
-        rays.direction[i] = mirror_direction(view, surface.normal)
+        rays.direction[i] = mirror_direction(view.direction, surface.normal)
         rays.weight[i] = wp.vec3(1.0)
         rays.source[i] = gbuffer.object[pixel]
 

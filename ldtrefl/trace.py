@@ -18,7 +18,9 @@ from ldtrefl import launch, warp_abi
 from ldtrefl.device_scene import DeviceMesh
 from ldtrefl.errors import InputError
 from ldtrefl.shade import ONE_THIRD
-from ldtrefl.unit_rays import aimed_start, distance_skipped, skipped_to
+from ldtrefl.strays import no_stray
+from ldtrefl.unit_rays import aimed_start, distance_skipped, is_near, skipped_to
+from ldtrefl.vectors import as_single
 
 SHORTEST = wp.constant(1.0e-15)
 LONGEST = wp.constant(1.0e15)
@@ -61,7 +63,7 @@ class Tracer:
     are near the object, see ``unit_rays.py``. ``outwards`` is 0 but for a ray that leaves the object's own surface: it
     is the unit normal there, on the ray's side, and what the tracer takes for that surface is not met.
     ``stray_hit(views, index, origin, direction, t_max) -> StrayHit``: the same for what lies far outside the object's
-    bulk; the origin is float64 and may lie anywhere.
+    bulk; the origin is float64 and may lie anywhere. ``stray_count(views, index) -> int``: how much does.
     """
 
     name: str
@@ -69,6 +71,7 @@ class Tracer:
     closest_hit: Any
     occluded: Any
     stray_hit: Any
+    stray_count: Any
 
 
 @dataclass(frozen=True)
@@ -94,19 +97,29 @@ def array_of_views(views: Sequence[Any], view: Any, device: wp.Device) -> wp.arr
 
 @launch.once
 def closest_hit_of(tracer: Tracer) -> Any:
-    """``closest(views, index, start, way, t_max) -> Hit`` for rays from anywhere: ``start`` float64, ``way`` a unit
-    vector, both in the unit space of object ``index``."""
-    closest_hit, stray_hit = tracer.closest_hit, tracer.stray_hit
+    """``closest(views, index, start, direction, way, t_max) -> Hit`` for rays from anywhere.
+
+    ``start`` is in the unit space of object ``index``, float64; ``way`` is the unit vector of ``direction``, which is
+    as exact as it was given; t and ``t_max`` are in unit space.
+    """
+    closest_hit, stray_hit, stray_count = tracer.closest_hit, tracer.stray_hit, tracer.stray_count
 
     @wp.func
-    def closest(views: Any, index: int, start: wp.vec3d, way: wp.vec3, t_max: float) -> Hit:
-        stray = stray_hit(views, index, start, way, t_max)
-        limit = wp.float64(wp.min(stray.t, t_max))
-        skipped = distance_skipped(start, way)
+    def closest(views: Any, index: int, start: wp.vec3d, direction: wp.vec3, way: wp.vec3, t_max: float) -> Hit:
+        origin = as_single(start)
+        skipped = wp.float64(0.0)
+        limit = t_max
+        stray = no_stray()
+        if not is_near(origin) or stray_count(views, index) > 0:
+            aimed = aimed_start(start, direction, way)
+            stray = stray_hit(views, index, aimed, way, t_max)
+            skipped = distance_skipped(aimed, way)
+            limit = float(wp.float64(wp.min(stray.t, t_max)) - skipped)
+            origin = skipped_to(aimed, way, skipped)
         hit = no_hit()
-        if skipped < limit:
-            near = skipped_to(start, way, skipped)
-            hit = closest_hit(views, index, near, way, float(limit - skipped))
+        if limit > 0.0:
+            hit = closest_hit(views, index, origin, way, limit)
+        if skipped > wp.float64(0.0):
             hit.t = float(wp.float64(hit.t) + skipped)
         if hit.triangle < 0 and stray.triangle >= 0:
             hit.t = stray.t
@@ -123,17 +136,19 @@ def closest_hit_of(tracer: Tracer) -> Any:
 def occluded_of(tracer: Tracer) -> Any:
     """``is_blocked(views, index, start, way, t_max, outwards) -> bool`` for rays from anywhere, see
     :func:`closest_hit_of`."""
-    occluded, stray_hit = tracer.occluded, tracer.stray_hit
+    occluded, stray_hit, stray_count = tracer.occluded, tracer.stray_hit, tracer.stray_count
 
     @wp.func
     def is_blocked(views: Any, index: int, start: wp.vec3d, way: wp.vec3, t_max: float, outwards: wp.vec3) -> bool:
-        if stray_hit(views, index, start, way, t_max).triangle >= 0:
-            return True
-        skipped = distance_skipped(start, way)
-        if skipped >= wp.float64(t_max):
-            return False
-        near = skipped_to(start, way, skipped)
-        return occluded(views, index, near, way, float(wp.float64(t_max) - skipped), outwards)
+        origin = as_single(start)
+        limit = t_max
+        if not is_near(origin) or stray_count(views, index) > 0:
+            if stray_hit(views, index, start, way, t_max).triangle >= 0:
+                return True
+            skipped = distance_skipped(start, way)
+            limit = float(wp.float64(t_max) - skipped)
+            origin = skipped_to(start, way, skipped)
+        return limit > 0.0 and occluded(views, index, origin, way, limit, outwards)
 
     return is_blocked
 
@@ -176,7 +191,7 @@ def batch_kernel(tracer: Tracer) -> wp.Kernel:
                 wp.float64(origin[0]) - centre[0], wp.float64(origin[1]) - centre[1], wp.float64(origin[2]) - centre[2]
             )
             way = direction / length
-            hit = closest(views, 0, aimed_start(start, direction, way), way, float(wp.inf))
+            hit = closest(views, 0, start, direction, way, float(wp.inf))
             if hit.triangle >= 0:
                 hit.t = float(wp.float64(hit.t) / (per_half * wp.float64(length)))
                 normal = hit.normal

@@ -11,7 +11,7 @@ import warp as wp
 from ldtrefl.device_scene import ObjectRecord
 from ldtrefl.vectors import as_double, as_single
 
-NEAR = wp.constant(wp.float64(8.0))
+NEAR = wp.constant(8.0)
 """Unit space: distance from the middle beyond which a ray's way to the object is taken in float64."""
 
 LEAVING = wp.constant(wp.float64(1.0e-6))
@@ -42,7 +42,7 @@ def into_unit(record: ObjectRecord, origin: wp.vec3d, direction: wp.vec3) -> Uni
 
 
 @wp.func
-def is_near(start: wp.vec3d) -> bool:
+def is_near(start: wp.vec3) -> bool:
     """Whether a ray's start is near the object, where float32 does for it."""
     return wp.abs(start[0]) <= NEAR and wp.abs(start[1]) <= NEAR and wp.abs(start[2]) <= NEAR
 
@@ -50,9 +50,9 @@ def is_near(start: wp.vec3d) -> bool:
 @wp.func
 def distance_skipped(start: wp.vec3d, way: wp.vec3) -> wp.float64:
     """How far a ray may go in float64 before it can meet the object's bulk; 0 for one that starts near."""
-    if is_near(start):
+    if is_near(as_single(start)):
         return wp.float64(0.0)
-    return wp.max(-wp.dot(start, as_double(way)) - NEAR, wp.float64(0.0))
+    return wp.max(-wp.dot(start, as_double(way)) - wp.float64(NEAR), wp.float64(0.0))
 
 
 @wp.func
@@ -65,7 +65,7 @@ def skipped_to(start: wp.vec3d, way: wp.vec3, skipped: wp.float64) -> wp.vec3:
 def aimed_start(start: wp.vec3d, direction: wp.vec3, way: wp.vec3) -> wp.vec3d:
     """A ray's start, moved aside so that along ``way``, the unit vector in float32, it comes to the object where
     it does along ``direction`` itself. The rounding of a unit vector is as large as an object that is so far away."""
-    if is_near(start):
+    if is_near(as_single(start)):
         return start
     exact = wp.normalize(as_double(direction))
     return start + wp.max(-wp.dot(start, exact), wp.float64(0.0)) * (exact - as_double(way))
