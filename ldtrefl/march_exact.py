@@ -12,9 +12,10 @@ from pathlib import Path
 import warp as wp
 
 from ldtrefl.grid import LANES, LARGE, PATCH_ROWS, SIDES, TRIANGLE, TRIANGLE_ROWS, GridView
+from ldtrefl.hit import Hit, no_hit
 from ldtrefl.shade import barycentrics_at, brought_inside
-from ldtrefl.strays import StrayHit, first_stray
-from ldtrefl.trace import Hit, Tracer, no_hit
+from ldtrefl.strays import first_stray
+from ldtrefl.trace import Tracer
 
 CELL_SLACK = 1.0e-4
 """Cells by which cells overlap along the ray: some twenty roundings of a coordinate in a grid of 64."""
@@ -166,7 +167,7 @@ def occluded_exact(
 @wp.func
 def stray_hit_exact(
     views: wp.array(dtype=GridView), index: int, origin: wp.vec3d, direction: wp.vec3, t_max: float
-) -> StrayHit:
+) -> Hit:
     """The tracer's ``stray_hit``."""
     return first_stray(views[index].strays, origin, direction, t_max)
 

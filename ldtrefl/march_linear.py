@@ -20,9 +20,9 @@ import warp as wp
 
 from ldtrefl.cubemap import texel_from_point
 from ldtrefl.fragments import LdtView, texel_number, triangle_of
+from ldtrefl.hit import Hit, no_hit
 from ldtrefl.shade import barycentrics_at
-from ldtrefl.strays import StrayHit, no_stray
-from ldtrefl.trace import Hit, Tracer, no_hit
+from ldtrefl.trace import Tracer
 
 BOX_MARGIN = wp.constant(0.01)
 """Texels by which the box is widened, so that surfaces on its sides lie inside it whatever the rounding."""
@@ -208,9 +208,9 @@ def occluded_linear(
 @wp.func
 def no_stray_linear(
     views: wp.array(dtype=LdtView), index: int, origin: wp.vec3d, direction: wp.vec3, t_max: float
-) -> StrayHit:
+) -> Hit:
     """The tracer's ``stray_hit``: the maps hold all triangles."""
-    return no_stray()
+    return no_hit()
 
 
 @wp.func

@@ -12,9 +12,10 @@ import warp as wp
 
 from ldtrefl import launch
 from ldtrefl.device_scene import DeviceMesh
+from ldtrefl.hit import Hit, no_hit
 from ldtrefl.mesh import Mesh
-from ldtrefl.strays import StrayHit, StrayTriangle, first_stray
-from ldtrefl.trace import Hit, Hits, Tracer, array_of_views, no_hit, trace_batch
+from ldtrefl.strays import StrayTriangle, first_stray
+from ldtrefl.trace import Hits, Tracer, array_of_views, trace_batch
 
 
 @wp.struct
@@ -53,7 +54,7 @@ def occluded_bvh(
 @wp.func
 def stray_hit_bvh(
     views: wp.array(dtype=BvhView), index: int, origin: wp.vec3d, direction: wp.vec3, t_max: float
-) -> StrayHit:
+) -> Hit:
     """The tracer's ``stray_hit``."""
     return first_stray(views[index].strays, origin, direction, t_max)
 

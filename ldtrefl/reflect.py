@@ -22,6 +22,7 @@ from ldtrefl.camera import camera_ray
 from ldtrefl.cull import Culled
 from ldtrefl.device_scene import LightingRecord, ObjectRecord
 from ldtrefl.gbuffer import BLOCK, GBuffer, GBufferView, pixel_surface, pixel_view
+from ldtrefl.hit import Hit, no_hit
 from ldtrefl.kept import Followed, changed_runs, put_hits, rays_of_runs
 from ldtrefl.rays import HitBuffer, RayBuffer, Regions, lowest_bit, meets_sphere, object_bits, sphere_entry
 from ldtrefl.shade import (
@@ -33,8 +34,7 @@ from ldtrefl.shade import (
     surface_at,
 )
 from ldtrefl.skips import Skips
-from ldtrefl.strays import StrayHit, no_stray
-from ldtrefl.trace import Hit, Tracer, closest_hit_of, no_hit, occluded_of
+from ldtrefl.trace import Tracer, closest_hit_of, occluded_of
 from ldtrefl.unit_rays import into_unit, start_above, start_above_own, unit_normal
 from ldtrefl.vectors import as_single, point_along
 
@@ -72,11 +72,9 @@ def never_occluded(
 
 
 @wp.func
-def never_stray(
-    views: wp.array(dtype=NoView), index: int, origin: wp.vec3d, direction: wp.vec3, t_max: float
-) -> StrayHit:
+def never_stray(views: wp.array(dtype=NoView), index: int, origin: wp.vec3d, direction: wp.vec3, t_max: float) -> Hit:
     """``stray_hit`` of a tracer that sees nothing."""
-    return no_stray()
+    return no_hit()
 
 
 @wp.func

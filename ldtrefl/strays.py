@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 import warp as wp
 
+from ldtrefl.hit import Hit, no_hit
 from ldtrefl.mesh import Mesh
 from ldtrefl.vectors import as_double, as_single
 
@@ -23,30 +24,10 @@ class StrayTriangle:
     triangle: int
 
 
-@wp.struct
-class StrayHit:
-    """Which stray triangle a ray meets first."""
-
-    t: float  # +inf on a miss
-    triangle: int  # -1 on a miss
-    u: float  # weights of the second and third corner
-    v: float
-    normal: wp.vec3  # unit
-
-
 @wp.func
-def no_stray() -> StrayHit:
-    """A miss."""
-    hit = StrayHit()
-    hit.t = float(wp.inf)
-    hit.triangle = -1
-    return hit
-
-
-@wp.func
-def first_stray(strays: wp.array(dtype=StrayTriangle), origin: wp.vec3d, direction: wp.vec3, t_max: float) -> StrayHit:
+def first_stray(strays: wp.array(dtype=StrayTriangle), origin: wp.vec3d, direction: wp.vec3, t_max: float) -> Hit:
     """Test every triangle (Moeller and Trumbore 1997), from ``origin`` in unit space along a unit ``direction``."""
-    hit = no_stray()
+    hit = no_hit()
     nearest = wp.float64(t_max)
     zero, one = wp.float64(0.0), wp.float64(1.0)
     way = as_double(direction)

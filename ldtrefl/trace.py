@@ -17,35 +17,14 @@ import warp as wp
 from ldtrefl import launch, warp_abi
 from ldtrefl.device_scene import DeviceMesh
 from ldtrefl.errors import InputError
+from ldtrefl.hit import Hit, no_hit
 from ldtrefl.shade import ONE_THIRD
-from ldtrefl.strays import no_stray
 from ldtrefl.unit_rays import aimed_start, distance_skipped, is_near, skipped_to
 from ldtrefl.vectors import as_single
 
 SHORTEST = wp.constant(1.0e-15)
 LONGEST = wp.constant(1.0e15)
 """Lengths of directions whose squares stay well inside float32's range."""
-
-
-@wp.struct
-class Hit:
-    """Where a ray meets an object first."""
-
-    t: float
-    triangle: int
-    u: float  # barycentrics: weights of the triangle's second and third corner; -1 if the triangle is one of many there
-    v: float
-    normal: wp.vec3  # of the facet, unit, by the triangle's winding
-    steps: int  # texels or samples looked at
-
-
-@wp.func
-def no_hit() -> Hit:
-    """A miss."""
-    hit = Hit()
-    hit.t = float(wp.inf)
-    hit.triangle = -1
-    return hit
 
 
 @wp.func
@@ -62,7 +41,7 @@ class Tracer:
     t_max, outwards) -> bool``: object ``index``, its unit space, unit direction, hits at ``0 <= t < t_max``. Origins
     are near the object, see ``unit_rays.py``. ``outwards`` is 0 but for a ray that leaves the object's own surface: it
     is the unit normal there, on the ray's side, and what the tracer takes for that surface is not met.
-    ``stray_hit(views, index, origin, direction, t_max) -> StrayHit``: the same for what lies far outside the object's
+    ``stray_hit(views, index, origin, direction, t_max) -> Hit``: the same for what lies far outside the object's
     bulk; the origin is float64 and may lie anywhere. ``stray_count(views, index) -> int``: how much does.
     """
 
@@ -109,7 +88,7 @@ def closest_hit_of(tracer: Tracer) -> Any:
         origin = as_single(start)
         skipped = wp.float64(0.0)
         limit = t_max
-        stray = no_stray()
+        stray = no_hit()
         if not is_near(origin) or stray_count(views, index) > 0:
             aimed = aimed_start(start, direction, way)
             stray = stray_hit(views, index, aimed, way, t_max)
@@ -122,11 +101,7 @@ def closest_hit_of(tracer: Tracer) -> Any:
         if skipped > wp.float64(0.0):
             hit.t = float(wp.float64(hit.t) + skipped)
         if hit.triangle < 0 and stray.triangle >= 0:
-            hit.t = stray.t
-            hit.triangle = stray.triangle
-            hit.u = stray.u
-            hit.v = stray.v
-            hit.normal = stray.normal
+            return stray
         return hit
 
     return closest

@@ -46,6 +46,7 @@ BOTTOM_TO_TOP = (
     "scene",
     "camera",
     "vectors",
+    "hit",
     "strays",
     "device_scene",
     "unit_rays",

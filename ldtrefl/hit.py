@@ -1,0 +1,26 @@
+"""What a ray meets first on an object."""
+
+from __future__ import annotations
+
+import warp as wp
+
+
+@wp.struct
+class Hit:
+    """Where a ray meets an object first."""
+
+    t: float
+    triangle: int
+    u: float  # barycentrics: weights of the triangle's second and third corner; -1 if the triangle is one of many there
+    v: float
+    normal: wp.vec3  # of the facet, unit, by the triangle's winding
+    steps: int  # texels or samples looked at
+
+
+@wp.func
+def no_hit() -> Hit:
+    """A miss."""
+    hit = Hit()
+    hit.t = float(wp.inf)
+    hit.triangle = -1
+    return hit
