@@ -163,8 +163,12 @@ def limit_of(by: str, mesh: ldtrefl.Mesh | None, resolution: int = TEXELS) -> Li
         return linear_limit(100.0, "resolutions from 16, stretched and thin meshes")
     if mesh is not None and len(mesh.faces) > FEW_TRIANGLES and by in ("balanced", "fast"):
         if resolution >= TEXELS:
-            # From inside and from close by, grazing rays are as many as others.
-            return dataclasses.replace(DENSE[by], p99=DENSE[by].worst)
+            # From inside and from close by, grazing rays are as many as others: twice as many disagree.
+            held = dataclasses.replace(DENSE[by], p99=DENSE[by].worst, p999=DENSE[by].worst, wrong=2 * DENSE[by].wrong)
+            if by == "balanced":
+                return held
+            why = f"{DENSE[by].why}; of 1000 grazing rays one passes between such patches, which no radius explains"
+            return dataclasses.replace(held, p999=np.inf, defects=0.2, why=why)
         # A texel of the map may be 16 of the 256 that are counted in.
         coarser = TEXELS / resolution
         return dataclasses.replace(
