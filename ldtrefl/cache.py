@@ -122,6 +122,8 @@ class MapCache:
 
     def store(self, key: str, arrays: dict[str, np.ndarray], values: dict[str, Any]) -> None:
         """Keep arrays and values under this name. A full disk is no fault: then nothing is kept."""
+        if self.path(key).is_dir():
+            return  # :meth:`load` has said so
         places, offset = {}, 0
         for name, array in arrays.items():
             places[name] = (array.dtype.str, array.shape, offset)

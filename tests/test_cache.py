@@ -452,3 +452,11 @@ def test_what_stands_in_a_files_place_is_replaced_and_not_written_through(cache:
     cache.store("a" * 32, {"x": np.arange(5, dtype=np.int32)}, {})
     assert not place.is_symlink() and place.is_file() and cache.load("a" * 32) is not None
     assert elsewhere.read_bytes() == b"mine" if kind == "link" else not elsewhere.exists()
+
+
+def test_a_folder_in_a_files_place_is_one_line(cache: MapCache, caplog: pytest.LogCaptureFixture) -> None:
+    cache.path("a" * 32).mkdir()
+    assert cache.load("a" * 32) is None
+    cache.store("a" * 32, {"x": np.arange(5, dtype=np.int32)}, {})
+    assert [record.levelno for record in caplog.records] == [logging.WARNING]
+    assert cache.path("a" * 32).is_dir() and len(list(cache.folder.iterdir())) == 1
