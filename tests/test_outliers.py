@@ -26,7 +26,7 @@ def test_an_outlier_changes_no_answer_and_a_wrong_one_is_found() -> None:
     for ray, t, triangle in ((hit, np.inf, -1), (hit, 1.001 * true_t[hit], 0), (miss, 1.0, 0)):
         changed = dataclasses.replace(hits, t=hits.t.copy(), triangle=hits.triangle.copy())
         changed.t[ray], changed.triangle[ray] = t, triangle
-        assert not outliers.judge_outlier(Outcome(), changed, true_t, directions).passed
+        assert not outliers.judge_outlier(Outcome(), mesh, changed, true_t, origins, directions).passed
 
 
 def test_an_ordinary_mesh_has_no_strays() -> None:

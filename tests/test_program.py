@@ -105,6 +105,8 @@ def test_what_is_no_regular_file(folder: Path, name: str) -> None:
 def test_signals_end_it_without_a_traceback(folder: Path, number: int, status: int, delay: float) -> None:
     """From the moment that our own code runs; before, the interpreter is starting."""
     marked = (
+        # What a background job of a shell ignores, and its children with it, counts again.
+        "import signal; signal.signal(signal.SIGINT, signal.default_int_handler);"
         "import sys; sys.argv = ['ldtrefl', 'compare', 'scene.toml', '--methods', 'ldt,bvh,envmap'];"
         "import ldtrefl.__main__ as program; handle = program._handle;"
         "program._handle = lambda *a: (handle(*a), print('ready', flush=True));"
@@ -124,7 +126,7 @@ def test_signals_end_it_without_a_traceback(folder: Path, number: int, status: i
     _, said = child.communicate(timeout=60)
     # Until everything is imported SIGTERM has nothing to tidy up, and ends the process by itself.
     assert child.returncode in ({status, -number} if number == signal.SIGTERM else {status}), said
-    assert said == ""
+    assert all(line.startswith("ldtrefl: compiling kernels") for line in said.splitlines()), said
     assert not list(folder.rglob(".*"))
 
 
