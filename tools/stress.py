@@ -1,6 +1,6 @@
 """Numerical stability under stress: a case a file, each against an answer that does not depend on what is tested.
 
-    python tools/stress.py                 # forty minutes; writes tools/results/stress.json and stress.md
+    python tools/stress.py                 # half an hour; writes tools/results/stress.json and stress.md
     python tools/stress.py --only fuzz     # one case, nothing written
     python tools/stress.py --quick         # a minute or two, small counts
 
