@@ -14,10 +14,9 @@ import numpy as np
 import warp as wp
 
 from ldtrefl.binning import CHUNK, bin_items, chunk_count, gather_lists, launch_chunks
-from ldtrefl.grid import cell_number, number_of_cell
 from ldtrefl.launch import kernel, launch
 from ldtrefl.patches import FACING, Survey
-from ldtrefl.pieces import Piece, high_corner, low_corner
+from ldtrefl.pieces import Piece, cell_number, high_corner, low_corner, number_of_cell
 
 LARGEST_END = wp.constant(0.25)
 """|n . axis| above ``FACING`` up to which a missing neighbour can be a surface that goes on in another map, and not an

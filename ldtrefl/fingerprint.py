@@ -20,6 +20,8 @@ PACKAGE = __name__.rpartition(".")[0]
 FOLDER = Path(__file__).parent
 IMPORTED = re.compile(rf"^\s*(?:from|import)\s+{PACKAGE}\.([\w.]+)|^\s*from\s+{PACKAGE}\s+import\s+(.*)", re.MULTILINE)
 """A line that imports a module of the package: ``from package.a.b import c``, ``from package import a, b``."""
+NATIVE = re.compile(r'"(\w+\.h)"')
+"""The name of a file of C++."""
 
 
 def fingerprint(module: str) -> str:
@@ -43,8 +45,7 @@ def _sources(module: str) -> tuple[tuple[str, ...], str]:
         source = path.read_bytes()
         for dotted, listed in IMPORTED.findall(source.decode()):
             wanted += [dotted] if dotted else re.findall(r"\w+", listed)
-        native = path.with_suffix(".h")
-        found[name] = source + (native.read_bytes() if native.is_file() else b"")
+        found[name] = source + b"".join((FOLDER / native).read_bytes() for native in NATIVE.findall(source.decode()))
     digest = xxhash.xxh3_128()
     for name in sorted(found):
         digest.update(f"{name} {len(found[name])} ".encode() + found[name])

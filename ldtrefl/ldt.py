@@ -20,15 +20,15 @@ from ldtrefl.errors import InputError, first_fault, unknown_name
 from ldtrefl.files import written_whole
 from ldtrefl.fingerprint import fingerprint
 from ldtrefl.fragments import LdtView
-from ldtrefl.grid import Grid
-from ldtrefl.grid_build import Quality, build_grid
-from ldtrefl.grid_check import check_grid
+from ldtrefl.items import Quality, tree_of
 from ldtrefl.march import TRACERS
-from ldtrefl.march_exact import GRAZING
 from ldtrefl.mesh import Mesh
 from ldtrefl.npz import read_arrays
 from ldtrefl.peel import Maps, Rasteriser, check_fragments, check_order, sort_fragments, sorted_maps
-from ldtrefl.trace import Hits, array_of_views, trace_batch, trace_rays
+from ldtrefl.trace import Hits, array_of_views, occluded_batch, trace_batch, trace_in_unit_space
+from ldtrefl.tree import Tree
+from ldtrefl.tree_check import check_tree
+from ldtrefl.tree_walk import GRAZING
 
 FORMAT = 1
 """Of saved files; goes up when what they hold changes."""
@@ -82,7 +82,7 @@ class LayeredDepthTexture:
     """An object's surfaces in six orthographic maps (Zhang, Hsieh and Shen, section 3.3); see ``fragments.py``.
 
     Made by :func:`ldtrefl.peel`. Object space is the object's own vertex coordinates. The sorted maps and the
-    occupancy grid over them (``grid.py``) are each made when they are first asked for.
+    tree over them (``tree.py``) are each made when they are first asked for.
     """
 
     def __init__(
@@ -113,16 +113,16 @@ class LayeredDepthTexture:
         return sort_fragments(self.frame, self._rasteriser.fragments())
 
     @functools.cached_property
-    def grid(self) -> Grid:
-        """The occupancy grid that the exact search walks."""
-        return self._kept("grid", self._make_grid, self._read_grid)
+    def tree(self) -> Tree:
+        """The tree that the exact search goes down."""
+        return self._kept("tree", self._make_tree, self._read_tree)
 
-    def _read_grid(self, entry: Entry) -> Grid:
-        check_grid(entry.arrays, entry.values, len(self.geometry.faces))
-        return Grid.unpacked(entry.arrays, entry.values, self.geometry)
+    def _read_tree(self, entry: Entry) -> Tree:
+        check_tree(entry.arrays, entry.values, len(self.geometry.faces))
+        return Tree.unpacked(entry.arrays, entry.values, self.geometry)
 
-    def _make_grid(self) -> Grid:
-        made = build_grid(self.geometry, self.resolution, self.quality, trusted=self.trusted)
+    def _make_tree(self) -> Tree:
+        made = tree_of(self.geometry, self.resolution, self.quality, trusted=self.trusted)
         if made.view.front != 0.0 and _shows_backs(made):
             made.view.front = 0.0
         return made
@@ -169,15 +169,15 @@ class LayeredDepthTexture:
 
     @property
     def record_count(self) -> int:
-        """Fragments in the maps and records in the grid, of what is made so far."""
+        """Fragments in the maps and records in the tree, of what is made so far."""
         fragments = self.fragment_count if "_maps" in self.__dict__ else 0
-        return fragments + (self.grid.records if "grid" in self.__dict__ else 0)
+        return fragments + (self.tree.records if "tree" in self.__dict__ else 0)
 
     @property
     def nbytes(self) -> int:
-        """Bytes that the maps and the grid take so far, the mesh not counted."""
+        """Bytes that the maps and the tree take so far, the mesh not counted."""
         maps = self._maps.nbytes if "_maps" in self.__dict__ else 0
-        return maps + (self.grid.nbytes if "grid" in self.__dict__ else 0)
+        return maps + (self.tree.nbytes if "tree" in self.__dict__ else 0)
 
     def counts(self, axis: int) -> np.ndarray:
         """(rows, columns) int32: fragments per texel of the map of ``axis``."""
@@ -206,7 +206,7 @@ class LayeredDepthTexture:
     def view(
         self, search: str = DEFAULT_SEARCH, *, linear_steps: int = LINEAR_STEPS, binary_steps: int = BINARY_STEPS
     ) -> Any:
-        """What kernels read for a search: a ``GridView`` for ``"exact"``, an ``LdtView`` for ``"linear"``.
+        """What kernels read for a search: a ``TreeView`` for ``"exact"``, an ``LdtView`` for ``"linear"``.
 
         Raises:
             InputError: an unknown search.
@@ -214,7 +214,7 @@ class LayeredDepthTexture:
         if search not in TRACERS:
             raise unknown_name("search", search, TRACERS)
         if search == "exact":
-            return self.grid.view
+            return self.tree.view
         view = LdtView()
         view.start, view.depth, view.reference = self._maps.start, self._maps.depth, self._maps.reference
         view.balanced = self._maps.balanced
@@ -230,26 +230,42 @@ class LayeredDepthTexture:
         self,
         origins: Any,
         directions: Any,
+        t_max: Any = None,
         *,
         search: str = DEFAULT_SEARCH,
         linear_steps: int = LINEAR_STEPS,
         binary_steps: int = BINARY_STEPS,
     ) -> Hits:
-        """First hits of n rays given in object space.
+        """First hits of rays given in object space.
 
         Args:
-            origins: (n, 3) float32 numpy or Warp array.
-            directions: (n, 3) float32, any length; ``t`` is in lengths of it.
-            search: ``"exact"``, a walk through the occupied cells, or ``"linear"``, the paper's.
+            origins: (..., 3) float32 numpy or Warp array.
+            directions: (..., 3) float32, any length; ``t`` is in lengths of it.
+            t_max: hits before this count; a number, or (...), one a ray; ``None``: all.
+            search: ``"exact"``, a walk down the tree, or ``"linear"``, the paper's.
             linear_steps, binary_steps: of the linear search.
 
         Raises:
-            InputError: shapes that do not fit, or an unknown search.
+            InputError: shapes that do not fit, what is not a number, or an unknown search.
         """
         view = self.view(search, linear_steps=linear_steps, binary_steps=binary_steps)
-        tracer = TRACERS[search]
-        views = array_of_views([view], tracer.view, self.geometry.vertices.device)
-        return trace_batch(tracer, views, self.geometry, origins, directions)
+        views = array_of_views([view], TRACERS[search].view, self.geometry.vertices.device)
+        return trace_batch(TRACERS[search], views, self.geometry, origins, directions, t_max)
+
+    def occluded(
+        self,
+        origins: Any,
+        directions: Any,
+        t_max: Any = None,
+        *,
+        search: str = DEFAULT_SEARCH,
+        linear_steps: int = LINEAR_STEPS,
+        binary_steps: int = BINARY_STEPS,
+    ) -> Any:
+        """(...) bool: whether rays meet the object at all; arguments and errors as :meth:`trace` has them."""
+        view = self.view(search, linear_steps=linear_steps, binary_steps=binary_steps)
+        views = array_of_views([view], TRACERS[search].view, self.geometry.vertices.device)
+        return occluded_batch(TRACERS[search], views, self.geometry, origins, directions, t_max)
 
     def save(self, path: str | Path) -> None:
         """Write the maps and their mesh to one file, whole or not at all.
@@ -313,14 +329,14 @@ def _mesh_and_frame(arrays: dict[str, np.ndarray]) -> tuple[Mesh, TexelFrame]:
     return mesh, TexelFrame((x, y, z), scale, (float(offset[0]), float(offset[1]), float(offset[2])))
 
 
-def _shows_backs(grid: Grid) -> bool:
+def _shows_backs(tree: Tree) -> bool:
     """Whether rays from all around meet backs of a surface that is closed as a whole: a part is wound the other way."""
-    device = grid.view.vertices.device
+    device = tree.view.vertices.device
     origins, directions = _rays_all_around(str(device))
-    views = array_of_views([grid.view], TRACERS["exact"].view, device)
-    hits = trace_rays(TRACERS["exact"], views, (np.zeros(3), 1.0), origins, directions)
+    views = array_of_views([tree.view], TRACERS["exact"].view, device)
+    hits = trace_in_unit_space(TRACERS["exact"], views, origins, directions)
     towards = (hits.normal.numpy() * directions.numpy()).sum(axis=1)
-    return int((grid.view.front * towards > GRAZING).sum()) > FEW_BACKS
+    return int((tree.view.front * towards > GRAZING).sum()) > FEW_BACKS
 
 
 @functools.cache

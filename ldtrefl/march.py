@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ldtrefl.march_exact import EXACT
 from ldtrefl.march_linear import LINEAR
+from ldtrefl.tree_walk import EXACT
 
 TRACERS = {tracer.name: tracer for tracer in (EXACT, LINEAR)}
 """By the name that the option ``search`` takes."""

@@ -22,7 +22,9 @@ from ldtrefl.cubemap import texel_from_point
 from ldtrefl.fragments import LdtView, texel_number, triangle_of
 from ldtrefl.hit import Hit, no_hit
 from ldtrefl.shade import barycentrics_at
-from ldtrefl.trace import Tracer
+from ldtrefl.trace import Query, Tracer, any_one_by_one, one_by_one
+from ldtrefl.unit_rays import distance_passed
+from ldtrefl.vectors import as_double, as_single, point_along
 
 BOX_MARGIN = wp.constant(0.01)
 """Texels by which the box is widened, so that surfaces on its sides lie inside it whatever the rounding."""
@@ -175,16 +177,17 @@ def march_linear(view: LdtView, origin: wp.vec3, direction: wp.vec3, t_max: floa
 
 
 @wp.func
-def closest_hit_linear(
-    views: wp.array(dtype=LdtView), index: int, origin: wp.vec3, direction: wp.vec3, t_max: float
-) -> Hit:
-    """The tracer's ``closest_hit`` by :func:`march_linear`."""
+def closest_hit_linear(views: wp.array(dtype=LdtView), index: int, query: Query) -> Hit:
+    """The tracer's closest hit of a ray, by :func:`march_linear`."""
+    passed = distance_passed(query.origin, query.direction)
+    origin, direction = as_single(point_along(query.origin, query.direction, passed)), query.direction
+    t_max = query.t_max - passed
     scale = views[index].texels_per_unit
     hit = no_hit()
     found = march_linear(views[index], scale * origin + views[index].texel_offset, scale * direction, t_max)
     hit.steps = found.steps
     if found.fragment >= 0:
-        hit.t = found.t
+        hit.t = passed + found.t
         hit.triangle = triangle_of(views[index].reference[found.fragment])
         corners = views[index].faces[hit.triangle]
         a, b = views[index].vertices[corners[0]], views[index].vertices[corners[1]]
@@ -197,12 +200,11 @@ def closest_hit_linear(
 
 
 @wp.func
-def occluded_linear(
-    views: wp.array(dtype=LdtView), index: int, origin: wp.vec3, direction: wp.vec3, t_max: float, outwards: wp.vec3
-) -> bool:
+def occluded_linear(views: wp.array(dtype=LdtView), index: int, query: Query, outwards: wp.vec3) -> bool:
     """The tracer's ``occluded`` by :func:`march_linear`."""
-    start = origin + (CLEARANCE / views[index].texels_per_unit) * outwards
-    return closest_hit_linear(views, index, start, direction, t_max).triangle >= 0
+    above = query
+    above.origin = query.origin + as_double((CLEARANCE / views[index].texels_per_unit) * outwards)
+    return closest_hit_linear(views, index, above).triangle >= 0
 
 
 @wp.func
@@ -219,4 +221,12 @@ def stray_count_linear(views: wp.array(dtype=LdtView), index: int) -> int:
     return 0
 
 
-LINEAR = Tracer("linear", LdtView, closest_hit_linear, occluded_linear, no_stray_linear, stray_count_linear)
+LINEAR = Tracer(
+    "linear",
+    LdtView,
+    one_by_one(closest_hit_linear, LdtView),
+    any_one_by_one(occluded_linear, LdtView),
+    occluded_linear,
+    no_stray_linear,
+    stray_count_linear,
+)

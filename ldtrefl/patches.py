@@ -17,10 +17,9 @@ import warp as wp
 from ldtrefl.binning import CHUNK, chunk_count, exclusive_scan, gather_lists, launch_chunks
 from ldtrefl.cubemap import TexelFrame, point_from_texel
 from ldtrefl.device_scene import DeviceMesh
-from ldtrefl.grid import LARGE, cell_number, number_of_cell
 from ldtrefl.launch import kernel
 from ldtrefl.peel import snapped_vertices
-from ldtrefl.pieces import Piece
+from ldtrefl.pieces import LARGE, Piece, cell_number, number_of_cell
 from ldtrefl.raster import (
     TEXEL_OF_SUBTEXEL,
     FixedTriangle,

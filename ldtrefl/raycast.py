@@ -15,7 +15,18 @@ from ldtrefl.device_scene import DeviceMesh
 from ldtrefl.hit import Hit, no_hit
 from ldtrefl.mesh import Mesh
 from ldtrefl.strays import StrayTriangle, first_stray
-from ldtrefl.trace import Hits, Tracer, array_of_views, trace_batch
+from ldtrefl.trace import (
+    Hits,
+    Query,
+    Tracer,
+    any_one_by_one,
+    array_of_views,
+    occluded_batch,
+    one_by_one,
+    trace_batch,
+)
+from ldtrefl.unit_rays import distance_passed
+from ldtrefl.vectors import as_single, point_along
 
 
 @wp.struct
@@ -27,28 +38,31 @@ class BvhView:
 
 
 @wp.func
-def closest_hit_bvh(
-    views: wp.array(dtype=BvhView), index: int, origin: wp.vec3, direction: wp.vec3, t_max: float
-) -> Hit:
-    """The tracer's ``closest_hit``."""
+def closest_hit_bvh(views: wp.array(dtype=BvhView), index: int, query: Query) -> Hit:
+    """The tracer's closest hit of a ray."""
     hit = no_hit()
-    found = wp.mesh_query_ray(views[index].mesh, origin, direction, t_max)
-    if found.result:
-        hit.t = found.t
-        hit.triangle = found.face
-        hit.normal = wp.normalize(found.normal)
-        # Warp's u and v weigh the first and second corner, ours the second and third.
-        hit.u = found.v
-        hit.v = 1.0 - found.u - found.v
+    if query.t_max > 0.0:
+        passed = distance_passed(query.origin, query.direction)
+        origin = as_single(point_along(query.origin, query.direction, passed))
+        found = wp.mesh_query_ray(views[index].mesh, origin, query.direction, query.t_max - passed)
+        if found.result:
+            hit.t = passed + found.t
+            hit.triangle = found.face
+            hit.normal = wp.normalize(found.normal)
+            # Warp's u and v weigh the first and second corner, ours the second and third.
+            hit.u = found.v
+            hit.v = 1.0 - found.u - found.v
     return hit
 
 
 @wp.func
-def occluded_bvh(
-    views: wp.array(dtype=BvhView), index: int, origin: wp.vec3, direction: wp.vec3, t_max: float, outwards: wp.vec3
-) -> bool:
+def occluded_bvh(views: wp.array(dtype=BvhView), index: int, query: Query, outwards: wp.vec3) -> bool:
     """The tracer's ``occluded``; a ray that leaves the mesh starts above its own triangle."""
-    return wp.mesh_query_ray_anyhit(views[index].mesh, origin, direction, t_max)
+    if not query.t_max > 0.0:
+        return False
+    passed = distance_passed(query.origin, query.direction)
+    origin = as_single(point_along(query.origin, query.direction, passed))
+    return wp.mesh_query_ray_anyhit(views[index].mesh, origin, query.direction, query.t_max - passed)
 
 
 @wp.func
@@ -65,7 +79,15 @@ def stray_count_bvh(views: wp.array(dtype=BvhView), index: int) -> int:
     return views[index].strays.shape[0]
 
 
-BVH = Tracer("bvh", BvhView, closest_hit_bvh, occluded_bvh, stray_hit_bvh, stray_count_bvh)
+BVH = Tracer(
+    "bvh",
+    BvhView,
+    one_by_one(closest_hit_bvh, BvhView),
+    any_one_by_one(occluded_bvh, BvhView),
+    occluded_bvh,
+    stray_hit_bvh,
+    stray_count_bvh,
+)
 
 
 class Raycaster:
@@ -107,15 +129,22 @@ class Raycaster:
         view.mesh, view.strays = self._mesh.id, self.geometry.strays
         return view
 
-    def trace(self, origins: Any, directions: Any) -> Hits:
-        """First hits of n rays given in object space.
+    def trace(self, origins: Any, directions: Any, t_max: Any = None) -> Hits:
+        """First hits of rays given in object space.
 
         Args:
-            origins: (n, 3) float32 numpy or Warp array.
-            directions: (n, 3) float32, any length; ``t`` is in lengths of it.
+            origins: (..., 3) float32 numpy or Warp array.
+            directions: (..., 3) float32, any length; ``t`` is in lengths of it.
+            t_max: hits before this count; a number, or (...), one a ray; ``None``: all.
 
         Raises:
-            InputError: the arrays' shapes are not (n, 3) and equal.
+            InputError: the arrays' shapes do not fit, or they hold no numbers.
         """
-        views = array_of_views([self.view()], BvhView, self.geometry.vertices.device)
-        return trace_batch(BVH, views, self.geometry, origins, directions)
+        return trace_batch(BVH, self._views(), self.geometry, origins, directions, t_max)
+
+    def occluded(self, origins: Any, directions: Any, t_max: Any = None) -> Any:
+        """(...) bool: whether rays meet the mesh at all; arguments and errors as :meth:`trace` has them."""
+        return occluded_batch(BVH, self._views(), self.geometry, origins, directions, t_max)
+
+    def _views(self) -> wp.array:
+        return array_of_views([self.view()], BvhView, self.geometry.vertices.device)

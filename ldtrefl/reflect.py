@@ -34,7 +34,7 @@ from ldtrefl.shade import (
     surface_at,
 )
 from ldtrefl.skips import Skips
-from ldtrefl.trace import Tracer, closest_hit_of, occluded_of
+from ldtrefl.trace import Query, Tracer, block_of, occluded_of, stray_merger
 from ldtrefl.unit_rays import into_unit, start_above, start_above_own, unit_normal
 from ldtrefl.vectors import as_single, point_along
 
@@ -58,15 +58,15 @@ class NoView:
 
 
 @wp.func
-def never_hit(views: wp.array(dtype=NoView), index: int, origin: wp.vec3, direction: wp.vec3, t_max: float) -> Hit:
-    """``closest_hit`` of a tracer that sees nothing."""
-    return no_hit()
+def never_hits(
+    views: wp.array(dtype=NoView), index: int, queries: wp.array(dtype=Query), count: int, hits: wp.array(dtype=Hit)
+):
+    """``closest_hits`` and ``any_hits`` of a tracer that sees nothing: they stay misses."""
+    return
 
 
 @wp.func
-def never_occluded(
-    views: wp.array(dtype=NoView), index: int, origin: wp.vec3, direction: wp.vec3, t_max: float, outwards: wp.vec3
-) -> bool:
+def never_occluded(views: wp.array(dtype=NoView), index: int, query: Query, outwards: wp.vec3) -> bool:
     """``occluded`` of a tracer that sees nothing."""
     return False
 
@@ -83,7 +83,7 @@ def nothing_strays(views: wp.array(dtype=NoView), index: int) -> int:
     return 0
 
 
-NOTHING = Tracer("nothing", NoView, never_hit, never_occluded, never_stray, nothing_strays)
+NOTHING = Tracer("nothing", NoView, never_hits, never_hits, never_occluded, never_stray, nothing_strays)
 """The tracer of scenes without shadows: kernels built from it hold no shadow rays."""
 
 
@@ -95,16 +95,6 @@ def no_shadows(device: wp.Device) -> BoundTracer:
 # Kernels built from a tracer.
 
 
-@wp.struct
-class Nearest:
-    """What a ray has met so far."""
-
-    t: float  # device units, +inf if nothing
-    object: int
-    triangle: int
-    barycentrics: wp.vec2
-
-
 @wp.func
 def without(bits: wp.uint32, k: int) -> wp.uint32:
     """The bits without that of object ``k``."""
@@ -112,47 +102,69 @@ def without(bits: wp.uint32, k: int) -> wp.uint32:
 
 
 @wp.func
-def next_entered(
-    objects: wp.array(dtype=ObjectRecord), bits: wp.uint32, word: int, origin: wp.vec3, direction: wp.vec3, t_max: float
+def bits_without_source(
+    regions: Regions, objects: wp.array(dtype=ObjectRecord), source: int, i: int, word: int
+) -> wp.uint32:
+    """The objects of a word that ray ``i`` can meet: not the one that it leaves."""
+    bits = object_bits(regions, objects, i, word)
+    if source / 32 == word:
+        bits = without(bits, source)
+    return bits
+
+
+@wp.func
+def first_entered(
+    objects: wp.array(dtype=ObjectRecord), bits: wp.uint32, word: int, origin: wp.vec3, direction: wp.vec3
 ) -> int:
-    """Of the objects of a word of bits, the one whose bounding sphere a ray enters first; -1 if it enters none before
-    ``t_max``."""
-    if bits == wp.uint32(0):
-        return -1
-    k = 32 * word + lowest_bit(bits)
-    if without(bits, k) == wp.uint32(0) and t_max == wp.inf:
-        # One alone, which most rays have, needs no root.
-        return wp.where(meets_sphere(origin, direction, objects[k].centre, objects[k].radius), k, -1)
-    first = int(-1)
-    nearest = float(t_max)
-    rest = wp.uint32(bits)
+    """Of the objects of a word of bits, the one whose bounding sphere a ray enters first; if it enters none, any."""
+    first = 32 * word + lowest_bit(bits)
+    rest = without(bits, first)
+    if rest == wp.uint32(0):
+        return first
+    nearest = sphere_entry(origin, direction, objects[first].centre, objects[first].radius)
     while rest != wp.uint32(0):
-        j = 32 * word + lowest_bit(rest)
-        entry = sphere_entry(origin, direction, objects[j].centre, objects[j].radius)
-        if entry >= 0.0 and (entry < nearest or (entry == nearest and first < 0)):
+        k = 32 * word + lowest_bit(rest)
+        entry = sphere_entry(origin, direction, objects[k].centre, objects[k].radius)
+        if entry >= 0.0 and (entry < nearest or nearest < 0.0):
             nearest = entry
-            first = j
-        rest = without(rest, j)
+            first = k
+        rest = without(rest, k)
     return first
 
 
 @wp.func
-def next_in_turn(
-    objects: wp.array(dtype=ObjectRecord), bits: wp.uint32, word: int, origin: wp.vec3, direction: wp.vec3, t_max: float
-) -> int:
-    """The first object of a word of bits, wherever it is; -1 if there is none."""
-    if bits == wp.uint32(0):
-        return -1
-    return 32 * word + lowest_bit(bits)
+def has_bit(bits: wp.uint32, k: int) -> bool:
+    """Whether the bit of object ``k`` is set in its word."""
+    return (bits & (wp.uint32(1) << wp.uint32(k % 32))) != wp.uint32(0)
+
+
+@wp.func
+def may_meet(record: ObjectRecord, origin: wp.vec3d, direction: wp.vec3, t_max: float) -> bool:
+    """Whether a ray enters the bounding sphere of an object before ``t_max``."""
+    start = as_single(origin)
+    if t_max == wp.inf:
+        return meets_sphere(start, direction, record.centre, record.radius)  # needs no root
+    entry = sphere_entry(start, direction, record.centre, record.radius)
+    return entry >= 0.0 and entry <= t_max
+
+
+@wp.func
+def keep_nearer(hits: HitBuffer, i: int, k: int, t: float, hit: Hit):
+    """Keep what ray ``i`` meets of object ``k``, if it is nearer than what it has met so far."""
+    # Of two in one place the first counts, in whatever order they are met.
+    if t < hits.t[i] or (t == hits.t[i] and k < hits.object[i]):
+        hits.t[i] = t
+        hits.object[i] = k
+        hits.triangle[i] = hit.triangle
+        hits.barycentrics[i] = wp.vec2(hit.u, hit.v)
 
 
 @launch.once
-def closest_hits_kernel(tracer: Tracer, bounds: bool = True) -> wp.Kernel:
-    """The kernel that finds where rays end. With ``bounds`` an object is searched for only if the ray enters its
-    bounding sphere before it has met another; of 32 the first to be entered comes first."""
-    closest = closest_hit_of(tracer)
-    next_object = next_entered if bounds else next_in_turn
-    to_infinity = wp.constant(not bounds)
+def closest_hits_kernel(tracer: Tracer, block: int, bounds: bool = True) -> wp.Kernel:
+    """The kernel that finds where rays end, ``block`` of them an item. With ``bounds`` an object is searched only for
+    the rays that enter its bounding sphere before they have met another; of 32 the first to be entered comes first."""
+    find_hits, merge_strays = tracer.closest_hits, stray_merger(tracer)
+    size, to_infinity = wp.constant(block), wp.constant(not bounds)
 
     @launch.kernel
     def closest_hits(
@@ -165,47 +177,65 @@ def closest_hits_kernel(tracer: Tracer, bounds: bool = True) -> wp.Kernel:
         # Out:
         hits: HitBuffer,
     ):
-        i = first + wp.tid()
-        source, origin, direction = rays.source[i], rays.origin[i], rays.direction[i]
-        rounded_origin = as_single(origin)
-        nearest = Nearest()
-        nearest.t = float(wp.inf)
-        nearest.object = -1
-        nearest.triangle = -1
-        steps = int(0)
-        searches = int(0)
-        words = wp.where(source >= 0, (objects.shape[0] + 31) / 32, 0)
+        begin = size * (first + wp.tid())
+        end = wp.min(begin + size, rays.source.shape[0])
+        query_room, hit_room = wp.zeros(shape=size, dtype=Query), wp.zeros(shape=size, dtype=Hit)
+        queries = wp.array(ptr=query_room.ptr, shape=(size,), dtype=Query)
+        found = wp.array(ptr=hit_room.ptr, shape=(size,), dtype=Hit)
+        number = wp.zeros(shape=size, dtype=wp.int32)
+        stretch = wp.zeros(shape=size, dtype=wp.float32)
+        lead = int(-1)  # a ray that says in which order
+        for i in range(begin, end):
+            hits.t[i] = wp.inf
+            hits.object[i] = -1
+            hits.triangle[i] = -1
+            hits.barycentrics[i] = wp.vec2(0.0)
+            hits.steps[i] = 0
+            hits.searches[i] = 0
+            if lead < 0 and rays.source[i] >= 0:
+                lead = i
+        words = wp.where(lead >= 0, (objects.shape[0] + 31) / 32, 0)
         for word in range(words):
-            left = object_bits(regions, objects, i, word)
-            if source / 32 == word:
-                left = without(left, source)
-            k = next_object(objects, left, word, rounded_origin, direction, nearest.t)
-            while k >= 0:
-                # t stays in device units: divide by the direction's length in unit space.
-                ray = into_unit(objects[k], origin, direction)
-                t_max = wp.where(to_infinity, wp.inf, BEYOND * nearest.t * ray.stretch)
-                hit = closest(views, k, ray.start, ray.way, ray.way, t_max)
-                steps += hit.steps
-                searches += 1
-                t = hit.t / ray.stretch
-                is_met = hit.triangle >= 0
-                if to_infinity and is_met:
-                    # Coarse patches may rise out of the sphere, where a search by bounds does not look.
-                    is_met = meets_sphere(rounded_origin, direction, objects[k].centre, objects[k].radius)
-                # Of two in one place the first counts, in whatever order they are met.
-                if is_met and (t < nearest.t or (t == nearest.t and k < nearest.object)):
-                    nearest.t = t
-                    nearest.object = k
-                    nearest.triangle = hit.triangle
-                    nearest.barycentrics = wp.vec2(hit.u, hit.v)
+            left = wp.uint32(0)
+            for i in range(begin, end):
+                if rays.source[i] >= 0:
+                    left = left | bits_without_source(regions, objects, rays.source[i], i, word)
+            while left != wp.uint32(0):
+                k = first_entered(objects, left, word, as_single(rays.origin[lead]), rays.direction[lead])
                 left = without(left, k)
-                k = next_object(objects, left, word, rounded_origin, direction, nearest.t)
-        hits.t[i] = nearest.t
-        hits.object[i] = nearest.object
-        hits.triangle[i] = nearest.triangle
-        hits.barycentrics[i] = nearest.barycentrics
-        hits.steps[i] = steps
-        hits.searches[i] = searches
+
+                # The rays that may meet it.
+                count = int(0)
+                for i in range(begin, end):
+                    source = rays.source[i]
+                    if source >= 0:
+                        bits = bits_without_source(regions, objects, source, i, word)
+                        is_searched = has_bit(bits, k)
+                        if is_searched and not to_infinity:
+                            is_searched = may_meet(objects[k], rays.origin[i], rays.direction[i], hits.t[i])
+                        if is_searched:
+                            ray = into_unit(objects[k], rays.origin[i], rays.direction[i])
+                            # t stays in device units: divide by the direction's length in unit space.
+                            t_max = wp.where(to_infinity, wp.inf, BEYOND * hits.t[i] * ray.stretch)
+                            queries[count].origin = ray.start
+                            queries[count].direction = ray.way
+                            queries[count].t_max = t_max
+                            number[count] = i
+                            stretch[count] = ray.stretch
+                            count += 1
+                if count > 0:
+                    find_hits(views, k, queries, count, found)
+                    merge_strays(views, k, queries, count, found)
+                for j in range(count):
+                    of = int(number[j])
+                    hits.steps[of] = hits.steps[of] + found[j].steps
+                    hits.searches[of] = hits.searches[of] + 1
+                    is_met = bool(found[j].triangle >= 0)
+                    if to_infinity and is_met:
+                        # Coarse patches may rise out of the sphere, where a search by bounds does not look.
+                        is_met = may_meet(objects[k], rays.origin[of], rays.direction[of], wp.inf)
+                    if is_met:
+                        keep_nearer(hits, of, k, found[j].t / stretch[j], found[j])
 
     return closest_hits
 
@@ -236,7 +266,11 @@ def direct_radiance_of(tracer: Tracer) -> Any:
                     start = start_above_own(objects[k], surface.triangle, ray.start, outwards)
                 else:
                     outwards = wp.vec3(0.0)
-                if is_blocked(views, k, start, ray.way, distance * ray.stretch, outwards):
+                query = Query()
+                query.origin = start
+                query.direction = ray.way
+                query.t_max = distance * ray.stretch
+                if is_blocked(views, k, query, outwards):
                     return False
         return True
 
@@ -499,7 +533,8 @@ def _bounce(
     scene, device, n = gbuffer.scene, gbuffer.scene.device, rays.pixel.shape[0]
     with stats.stage("march", device):
         inputs = [rays, scene.records, bound.views, regions, hits]
-        launch.launch(closest_hits_kernel(bound.tracer, skips.bounds), n, inputs, device)
+        block = block_of(device)
+        launch.launch(closest_hits_kernel(bound.tracer, block, skips.bounds), -(-n // block), inputs, device)
         alive = int(np.count_nonzero(rays.source.numpy() >= 0))
         searches = int(hits.searches.numpy().sum(dtype=np.int64))
         stats.count("rays", alive)

@@ -26,8 +26,6 @@ class Skips:
     """Objects that no ray is handed: never peeled."""
     bounds: bool = True
     """Objects whose bounding sphere a ray misses, or enters behind what it has met: not searched; nearest first."""
-    leaps: bool = True
-    """Empty cells of an object's grid: leapt over, as many at once as can be."""
     attributes: bool = True
     """Normals of objects that only glow or show their facets, texture coordinates without textures: not made."""
     frames: bool = True

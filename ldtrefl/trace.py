@@ -1,10 +1,10 @@
 """What a tracer is, and tracing a batch of rays with one.
 
-A *tracer* answers single rays against single objects inside kernels: ``closest_hit`` and ``occluded``, two Warp
-functions over an array of *views*, one view per object. Kernels that trace are built from a tracer, so everything
-above it (bounces, shadows, shading, counters) exists once for the layered depth texture and for the BVH.
+A *tracer* answers rays against single objects inside kernels: Warp functions over an array of *views*, one view per
+object. Rays come in blocks, so that a tracer may search for them together. Kernels that trace are built from a tracer,
+so everything above it (bounces, shadows, shading, counters) exists once for the layered depth texture and for the BVH.
 
-A tracer works in the object's unit space, with unit directions. A miss is ``t = +inf`` and triangle -1.
+A tracer works in the object's unit space. A miss is ``t = +inf`` and triangle -1.
 """
 
 from collections.abc import Sequence
@@ -17,10 +17,7 @@ import warp as wp
 from ldtrefl import launch, warp_abi
 from ldtrefl.device_scene import DeviceMesh
 from ldtrefl.errors import InputError
-from ldtrefl.hit import Hit, no_hit
-from ldtrefl.shade import ONE_THIRD
-from ldtrefl.unit_rays import aimed_start, distance_skipped, is_near, skipped_to
-from ldtrefl.vectors import as_single
+from ldtrefl.hit import Hit
 
 SHORTEST = wp.constant(1.0e-15)
 LONGEST = wp.constant(1.0e15)
@@ -33,24 +30,66 @@ def is_number(x: float) -> bool:
     return wp.abs(x) < wp.inf
 
 
+RAY_BLOCK = wp.constant(64)
+"""Rays that are searched for together on the CPU: as many as a block of 8 x 8 pixels has."""
+
+
+@wp.struct
+class Query:
+    """A ray that is searched for in an object, in its unit space: hits at ``0 <= t < t_max`` count."""
+
+    origin: wp.vec3d
+    direction: wp.vec3  # about as long as 1; t is in lengths of it
+    t_max: float
+
+
 @dataclass(frozen=True)
 class Tracer:
-    """A pair of Warp functions and the type of the views that they read.
+    """Warp functions and the type of the views that they read.
 
-    ``closest_hit(views, index, origin, direction, t_max) -> Hit`` and ``occluded(views, index, origin, direction,
-    t_max, outwards) -> bool``: object ``index``, its unit space, unit direction, hits at ``0 <= t < t_max``. Origins
-    are near the object, see ``unit_rays.py``. ``outwards`` is 0 but for a ray that leaves the object's own surface: it
-    is the unit normal there, on the ray's side, and what the tracer takes for that surface is not met.
-    ``stray_hit(views, index, origin, direction, t_max) -> Hit``: the same for what lies far outside the object's
-    bulk; the origin is float64 and may lie anywhere. ``stray_count(views, index) -> int``: how much does.
+    ``closest_hits(views, index, queries, count, hits)``: the first hits of up to ``RAY_BLOCK`` rays on object
+    ``index``; of misses t and the triangle are set.
+    ``any_hits``, the same: whether rays meet anything, by the triangle in ``hits``, which may be any then.
+    ``occluded(views, index, query, outwards) -> bool``: whether one ray does. ``outwards`` is 0 but for a ray that
+    leaves the object's own surface: it is the unit normal there, on the ray's side, and what the tracer takes for that
+    surface is not met.
+    ``stray_hit(views, index, origin, direction, t_max) -> Hit``: for what lies far outside the object's bulk; the
+    origin is float64 and may lie anywhere. ``stray_count(views, index) -> int``: how much does.
     """
 
     name: str
     view: Any
-    closest_hit: Any
+    closest_hits: Any
+    any_hits: Any
     occluded: Any
     stray_hit: Any
     stray_count: Any
+
+
+def one_by_one(closest_hit: Any, view: Any) -> Any:
+    """``closest_hits`` by a ``closest_hit(views, index, query) -> Hit``."""
+
+    @wp.func
+    def closest_hits(
+        views: wp.array(dtype=view), index: int, queries: wp.array(dtype=Query), count: int, hits: wp.array(dtype=Hit)
+    ):
+        for i in range(count):
+            hits[i] = closest_hit(views, index, queries[i])
+
+    return closest_hits
+
+
+def any_one_by_one(occluded: Any, view: Any) -> Any:
+    """``any_hits`` by an ``occluded``."""
+
+    @wp.func
+    def any_hits(
+        views: wp.array(dtype=view), index: int, queries: wp.array(dtype=Query), count: int, hits: wp.array(dtype=Hit)
+    ):
+        for i in range(count):
+            hits[i].triangle = wp.where(occluded(views, index, queries[i], wp.vec3(0.0)), 0, -1)
+
+    return any_hits
 
 
 @dataclass(frozen=True)
@@ -75,63 +114,145 @@ def array_of_views(views: Sequence[Any], view: Any, device: wp.Device) -> wp.arr
 
 
 @launch.once
-def closest_hit_of(tracer: Tracer) -> Any:
-    """``closest(views, index, start, direction, way, t_max) -> Hit`` for rays from anywhere.
-
-    ``start`` is in the unit space of object ``index``, float64; ``way`` is the unit vector of ``direction``, which is
-    as exact as it was given; t and ``t_max`` are in unit space.
-    """
-    closest_hit, stray_hit, stray_count = tracer.closest_hit, tracer.stray_hit, tracer.stray_count
+def stray_merger(tracer: Tracer) -> Any:
+    """``merge(views, index, queries, count, hits)``: what rays meet far outside the bulk counts, too."""
+    stray_hit, stray_count = tracer.stray_hit, tracer.stray_count
 
     @wp.func
-    def closest(views: Any, index: int, start: wp.vec3d, direction: wp.vec3, way: wp.vec3, t_max: float) -> Hit:
-        origin = as_single(start)
-        skipped = wp.float64(0.0)
-        limit = t_max
-        stray = no_hit()
-        if not is_near(origin) or stray_count(views, index) > 0:
-            aimed = aimed_start(start, direction, way)
-            stray = stray_hit(views, index, aimed, way, t_max)
-            skipped = distance_skipped(aimed, way)
-            limit = float(wp.float64(wp.min(stray.t, t_max)) - skipped)
-            origin = skipped_to(aimed, way, skipped)
-        hit = no_hit()
-        if limit > 0.0:
-            hit = closest_hit(views, index, origin, way, limit)
-        if skipped > wp.float64(0.0):
-            hit.t = float(wp.float64(hit.t) + skipped)
-        if hit.triangle < 0 and stray.triangle >= 0:
-            return stray
-        return hit
+    def merge(views: Any, index: int, queries: wp.array(dtype=Query), count: int, hits: wp.array(dtype=Hit)):
+        if stray_count(views, index) > 0:
+            for i in range(count):
+                t_max = queries[i].t_max
+                if hits[i].triangle >= 0:
+                    t_max = hits[i].t
+                stray = stray_hit(views, index, queries[i].origin, queries[i].direction, t_max)
+                if stray.triangle >= 0:
+                    stray.steps = hits[i].steps
+                    hits[i] = stray
 
-    return closest
+    return merge
 
 
 @launch.once
 def occluded_of(tracer: Tracer) -> Any:
-    """``is_blocked(views, index, start, way, t_max, outwards) -> bool`` for rays from anywhere, see
-    :func:`closest_hit_of`."""
+    """``is_blocked(views, index, query, outwards) -> bool``: the tracer's ``occluded``, strays counted."""
     occluded, stray_hit, stray_count = tracer.occluded, tracer.stray_hit, tracer.stray_count
 
     @wp.func
-    def is_blocked(views: Any, index: int, start: wp.vec3d, way: wp.vec3, t_max: float, outwards: wp.vec3) -> bool:
-        origin = as_single(start)
-        limit = t_max
-        if not is_near(origin) or stray_count(views, index) > 0:
-            if stray_hit(views, index, start, way, t_max).triangle >= 0:
+    def is_blocked(views: Any, index: int, query: Query, outwards: wp.vec3) -> bool:
+        if stray_count(views, index) > 0:
+            if stray_hit(views, index, query.origin, query.direction, query.t_max).triangle >= 0:
                 return True
-            skipped = distance_skipped(start, way)
-            limit = float(wp.float64(t_max) - skipped)
-            origin = skipped_to(start, way, skipped)
-        return limit > 0.0 and occluded(views, index, origin, way, limit, outwards)
+        return occluded(views, index, query, outwards)
 
     return is_blocked
 
 
+def block_of(device: wp.Device) -> int:
+    """Rays that one item of a kernel searches for."""
+    return int(RAY_BLOCK) if device.is_cpu else 1
+
+
+START = """
+    int invalid = 0;
+    for (int k = 0; k < count; ++k) {
+        auto& origin = origins.data[begin + k];
+        auto& direction = directions.data[begin + k];
+        auto& query = queries.data[k];
+        const float x = direction[0], y = direction[1], z = direction[2];
+        const float square = x * x + y * y + z * z;
+        float scale = 1.0f;
+        if (!(square > 0.5f && square < 2.0f)) {
+            // Not about as long as 1: by a power of two, which rounds nothing.
+            const float a = wp::abs(x), b = wp::abs(y), c = wp::abs(z);
+            const float largest = a > b ? (a > c ? a : c) : (b > c ? b : c);
+            int bits;
+            memcpy(&bits, &largest, 4);
+            const int exponent = bits >> 23;  // of the scale 254 less this, but from 1 on
+            bits = (exponent < 254 ? 254 - exponent : 1) << 23;
+            memcpy(&scale, &bits, 4);
+            if (!(largest > 0.0f && a < INFINITY && b < INFINITY && c < INFINITY)) scale = 0.0f;
+        }
+        const bool is_finite = wp::abs(origin[0]) < INFINITY && wp::abs(origin[1]) < INFINITY
+            && wp::abs(origin[2]) < INFINITY;
+        // Shift and scale in float64: the object may be tiny and far from its origin.
+        for (int i = 0; i < 3; ++i) {
+            query.origin[i] = per_half * ((double)origin[i] - centre[i]);
+            query.direction[i] = scale * direction[i];
+        }
+        query.t_max = INFINITY;
+        if (t_max.shape[0] > 0) {
+            const float end = t_max.data[t_max.shape[0] > 1 ? begin + k : 0];
+            query.t_max = (float)(end * per_half / scale);
+        }
+        if (!(is_finite && scale > 0.0f)) {
+            for (int i = 0; i < 3; ++i) {
+                query.origin[i] = 0.0;
+                query.direction[i] = 1.0f;
+            }
+            query.t_max = -1.0f;
+            ++invalid;
+        }
+        scales.data[k] = scale;
+    }
+    return invalid;
+"""
+
+
+@wp.func_native(START)
+def start_queries(
+    origins: wp.array(dtype=wp.vec3),
+    directions: wp.array(dtype=wp.vec3),
+    t_max: wp.array(dtype=float),
+    begin: int,
+    count: int,
+    centre: wp.vec3d,
+    per_half: wp.float64,
+    queries: wp.array(dtype=Query),
+    scales: wp.array(dtype=float),
+) -> wp.int32:
+    """Rays from ``begin`` on in unit space, and how much longer their directions have become there; the number of
+    those that are not finite or have no direction, which search for nothing."""
+    ...
+
+
+FINISH = """
+    for (int k = 0; k < count; ++k) {
+        auto& hit = hits.data[k];
+        const int i = begin + k;
+        const bool is_met = hit.triangle >= 0;
+        triangle.data[i] = hit.triangle;
+        t.data[i] = is_met ? (float)(hit.t * (scales.data[k] / per_half)) : INFINITY;
+        const float third = 1.0f / 3.0f;
+        barycentrics.data[i][0] = is_met ? (hit.u < 0.0f ? third : hit.u) : 0.0f;
+        barycentrics.data[i][1] = is_met ? (hit.u < 0.0f ? third : hit.v) : 0.0f;
+        for (int axis = 0; axis < 3; ++axis) normal.data[i][axis] = is_met ? hit.normal[axis] : 0.0f;
+    }
+"""
+
+
+@wp.func_native(FINISH)
+def write_hits(
+    hits: wp.array(dtype=Hit),
+    scales: wp.array(dtype=float),
+    per_half: wp.float64,
+    begin: int,
+    count: int,
+    t: wp.array(dtype=float),
+    normal: wp.array(dtype=wp.vec3),
+    triangle: wp.array(dtype=int),
+    barycentrics: wp.array(dtype=wp.vec2),
+):
+    """What the rays from ``begin`` on meet, as users get it."""
+    ...
+
+
 @launch.once
-def batch_kernel(tracer: Tracer) -> wp.Kernel:
-    """The kernel that traces rays given in object space."""
-    closest = closest_hit_of(tracer)
+def batch_kernel(tracer: Tracer, block: int, only_whether: bool = False) -> wp.Kernel:
+    """The kernel that traces rays given in object space, ``block`` of them an item; or that finds ``only_whether`` they
+    meet anything, by the number of the triangle, which may be any then."""
+    find_hits = tracer.any_hits if only_whether else tracer.closest_hits
+    merge_strays, size = stray_merger(tracer), wp.constant(block)
 
     @launch.kernel
     def trace_batch(
@@ -142,92 +263,153 @@ def batch_kernel(tracer: Tracer) -> wp.Kernel:
         per_half: wp.float64,
         origins: wp.array(dtype=wp.vec3),
         directions: wp.array(dtype=wp.vec3),
+        t_max: wp.array(dtype=float),  # of each ray, or one for all; empty: without end
         # Out:
         t_out: wp.array(dtype=float),
         normal_out: wp.array(dtype=wp.vec3),
         triangle_out: wp.array(dtype=int),
         barycentrics_out: wp.array(dtype=wp.vec2),
-        invalid_out: wp.array(dtype=wp.uint8),
+        invalid_out: wp.array(dtype=int),  # rays of the block that are not finite or have no direction
     ):
-        i = first + wp.tid()
-        origin = origins[i]
-        direction = directions[i]
-        hit = no_hit()
-        normal = wp.vec3(0.0)
-        length = wp.length(direction)
-        if length < SHORTEST or length > LONGEST:
-            # Its square may have left float32's range.
-            largest = wp.max(wp.abs(direction[0]), wp.max(wp.abs(direction[1]), wp.abs(direction[2])))
-            length = largest * wp.length(direction / largest)
-        is_valid = is_number(origin[0]) and is_number(origin[1]) and is_number(origin[2]) and is_number(length)
-        if is_valid and length > 0.0:
-            # Shift and scale in float64: the object may be tiny and far from its origin.
-            start = per_half * wp.vec3d(
-                wp.float64(origin[0]) - centre[0], wp.float64(origin[1]) - centre[1], wp.float64(origin[2]) - centre[2]
-            )
-            way = direction / length
-            hit = closest(views, 0, start, direction, way, float(wp.inf))
-            if hit.triangle >= 0:
-                hit.t = float(wp.float64(hit.t) / (per_half * wp.float64(length)))
-                normal = hit.normal
-                if hit.u < 0.0:
-                    hit.u = ONE_THIRD
-                    hit.v = ONE_THIRD
+        item = first + wp.tid()
+        begin = size * item
+        count = wp.min(size, origins.shape[0] - begin)
+        query_room, hit_room = wp.zeros(shape=size, dtype=Query), wp.zeros(shape=size, dtype=Hit)
+        scale_room = wp.zeros(shape=size, dtype=wp.float32)
+        # Arrays over them, which are handed on as they are: rooms would be copied.
+        queries = wp.array(ptr=query_room.ptr, shape=(size,), dtype=Query)
+        hits = wp.array(ptr=hit_room.ptr, shape=(size,), dtype=Hit)
+        scales = wp.array(ptr=scale_room.ptr, shape=(size,), dtype=wp.float32)
+        invalid = start_queries(origins, directions, t_max, begin, count, centre, per_half, queries, scales)
+        find_hits(views, 0, queries, count, hits)
+        merge_strays(views, 0, queries, count, hits)
+        if t_out.shape[0] > 0:
+            write_hits(hits, scales, per_half, begin, count, t_out, normal_out, triangle_out, barycentrics_out)
         else:
-            invalid_out[i] = wp.uint8(1)
-        t_out[i] = hit.t
-        normal_out[i] = normal
-        triangle_out[i] = hit.triangle
-        barycentrics_out[i] = wp.vec2(hit.u, hit.v)
+            for k in range(count):
+                triangle_out[begin + k] = hits[k].triangle
+        invalid_out[item] = invalid
 
     return trace_batch
 
 
-def trace_batch(tracer: Tracer, views: wp.array, geometry: DeviceMesh, origins: Any, directions: Any) -> Hits:
-    """Trace n rays, given in the object's own coordinates, against one object.
+def trace_batch(
+    tracer: Tracer, views: wp.array, geometry: DeviceMesh, origins: Any, directions: Any, t_max: Any = None
+) -> Hits:
+    """Trace rays, given in the object's own coordinates, against one object.
 
     Args:
-        origins: (n, 3) float32, a numpy or Warp array.
-        directions: (n, 3) float32, any length.
+        origins: (..., 3) float32, a numpy or Warp array.
+        directions: (..., 3) float32, any length.
+        t_max: hits before this count, in lengths of the direction; a number, or (...), one a ray; ``None``: all.
 
     Raises:
-        InputError: the arrays' shapes are not (n, 3) and equal.
+        InputError: the arrays' shapes do not fit, or they hold no numbers.
     """
-    as_warp = isinstance(origins, wp.array)
-    device = geometry.vertices.device
-    starts, ways = (_ray_array(rays, name, device) for rays, name in ((origins, "origins"), (directions, "directions")))
-    if starts.shape != ways.shape:
-        raise InputError(f"{starts.shape[0]} origins for {ways.shape[0]} directions")
-    hits = trace_rays(tracer, views, geometry.mesh.unit_frame, starts, ways)
-    if as_warp:
+    rays = _Rays(origins, directions, t_max, geometry.vertices.device)
+    hits = _traced(tracer, views, geometry.mesh.unit_frame, rays)
+    if isinstance(origins, wp.array):
         return hits
-    return Hits(hits.t.numpy(), hits.normal.numpy(), hits.triangle.numpy(), hits.barycentrics.numpy(), hits.invalid)
+    shape = rays.shape
+    return Hits(
+        hits.t.numpy().reshape(shape),
+        hits.normal.numpy().reshape(*shape, 3),
+        hits.triangle.numpy().reshape(shape),
+        hits.barycentrics.numpy().reshape(*shape, 2),
+        hits.invalid,
+    )
 
 
-def trace_rays(
-    tracer: Tracer, views: wp.array, unit_frame: tuple[np.ndarray, float], origins: wp.array, directions: wp.array
-) -> Hits:
-    """:func:`trace_batch` for Warp arrays, with the ``unit_frame`` of the rays: (0, 1) if they are in unit space."""
-    n, device = origins.shape[0], origins.device
-    centre, half = unit_frame
+def trace_in_unit_space(tracer: Tracer, views: wp.array, origins: wp.array, directions: wp.array) -> Hits:
+    """:func:`trace_batch` for Warp arrays of rays in the object's unit space."""
+    return _traced(tracer, views, (np.zeros(3), 1.0), _Rays(origins, directions, None, origins.device))
+
+
+def occluded_batch(
+    tracer: Tracer, views: wp.array, geometry: DeviceMesh, origins: Any, directions: Any, t_max: Any = None
+) -> Any:
+    """Whether rays meet an object at all; arguments and errors as :func:`trace_batch` has them.
+
+    Returns:
+        (...) bool; for Warp arrays (n,) int32, below 0 where nothing is met.
+    """
+    device = geometry.vertices.device
+    rays = _Rays(origins, directions, t_max, device)
+    triangle = wp.empty(rays.count, dtype=int, device=device)
+    none, nowhere = wp.empty(0, dtype=float, device=device), wp.empty(0, dtype=wp.vec3, device=device)
+    outputs = [none, nowhere, triangle, wp.empty(0, dtype=wp.vec2, device=device)]
+    _launch_batch(tracer, views, geometry.mesh.unit_frame, rays, outputs, only_whether=True)
+    return triangle if isinstance(origins, wp.array) else (triangle.numpy() >= 0).reshape(rays.shape)
+
+
+class _Rays:
+    """Rays as a user gives them, on a device."""
+
+    def __init__(self, origins: Any, directions: Any, t_max: Any, device: wp.Device) -> None:
+        self.origins, self.shape = _ray_array(origins, "origins", device)
+        self.directions, other = _ray_array(directions, "directions", device)
+        if self.shape != other:
+            raise InputError(f"origins of shape {(*self.shape, 3)} for directions of shape {(*other, 3)}")
+        self.count = self.origins.shape[0]
+        self.t_max = _limits(t_max, self.shape, device)
+
+
+def _traced(tracer: Tracer, views: wp.array, unit_frame: tuple[np.ndarray, float], rays: _Rays) -> Hits:
+    n, device = rays.count, rays.origins.device
     t, triangle = wp.empty(n, dtype=float, device=device), wp.empty(n, dtype=int, device=device)
     normal, barycentrics = wp.empty(n, dtype=wp.vec3, device=device), wp.empty(n, dtype=wp.vec2, device=device)
-    invalid = wp.zeros(n, dtype=wp.uint8, device=device)
-    inputs = [views, wp.vec3d(*centre), wp.float64(1.0 / half), origins, directions]
-    launch.launch(batch_kernel(tracer), n, [*inputs, t, normal, triangle, barycentrics, invalid], device)
-    return Hits(t, normal, triangle, barycentrics, int(np.count_nonzero(invalid.numpy())))
+    invalid = _launch_batch(tracer, views, unit_frame, rays, [t, normal, triangle, barycentrics])
+    return Hits(t, normal, triangle, barycentrics, invalid)
 
 
-def _ray_array(rays: Any, name: str, device: wp.Device) -> wp.array:
+def _launch_batch(
+    tracer: Tracer,
+    views: wp.array,
+    unit_frame: tuple[np.ndarray, float],
+    rays: _Rays,
+    outputs: list[wp.array],
+    *,
+    only_whether: bool = False,
+) -> int:
+    """Trace rays; the number of those that are invalid. The ``unit_frame`` is (0, 1) if they are in unit space."""
+    device, (centre, half) = rays.origins.device, unit_frame
+    block = block_of(device)
+    items = -(-rays.count // block)
+    invalid = wp.empty(items, dtype=int, device=device)
+    inputs = [views, wp.vec3d(*centre), wp.float64(1.0 / half), rays.origins, rays.directions, rays.t_max]
+    launch.launch(batch_kernel(tracer, block, only_whether), items, [*inputs, *outputs, invalid], device)
+    return int(invalid.numpy().sum())
+
+
+def _limits(t_max: Any, shape: tuple[int, ...], device: wp.Device) -> wp.array:
+    """(n,), (1,) or, where there are none, (0,) float32."""
+    if t_max is None:
+        return wp.empty(0, dtype=float, device=device)
+    if isinstance(t_max, wp.array):
+        t_max = t_max.numpy()
+    try:
+        with np.errstate(over="ignore"):
+            limits = np.asarray(t_max, np.float32)
+        if limits.ndim > 0:
+            limits = np.ascontiguousarray(np.broadcast_to(limits, shape))
+    except (TypeError, ValueError) as error:
+        raise InputError(f"t_max must be a number, or numbers of shape {shape}") from error
+    return wp.array(limits.reshape(-1), dtype=float, device=device)
+
+
+def _ray_array(rays: Any, name: str, device: wp.Device) -> tuple[wp.array, tuple[int, ...]]:
+    """(n,) vec3 on the device, and the shape that the rays were given in, without their coordinates."""
     if isinstance(rays, wp.array):
         if rays.dtype is wp.vec3 and rays.ndim == 1:
-            return rays.to(device)
+            return rays.to(device), rays.shape
         rays = rays.numpy()
     try:
         with np.errstate(over="ignore"):  # too large for float32 is infinite: a ray that counts as invalid
             array = np.ascontiguousarray(rays, np.float32)
     except (TypeError, ValueError) as error:
-        raise InputError(f"{name} must be numbers of shape (n, 3)") from error
-    if array.ndim != 2 or array.shape[1] != 3:
-        raise InputError(f"{name} must have shape (n, 3), got {array.shape}")
-    return wp.array(array, dtype=wp.vec3, device=device, copy=False)  # on the CPU they are only read where they lie
+        raise InputError(f"{name} must be numbers of shape (..., 3)") from error
+    if array.ndim < 1 or array.shape[-1] != 3:
+        raise InputError(f"{name} must have shape (..., 3), got {array.shape}")
+    shape = array.shape[:-1]
+    flat = array.reshape(-1, 3)
+    return wp.array(flat, dtype=wp.vec3, device=device, copy=False), shape  # on the CPU they are read where they lie

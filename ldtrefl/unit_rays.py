@@ -11,8 +11,8 @@ import warp as wp
 from ldtrefl.device_scene import ObjectRecord
 from ldtrefl.vectors import as_double, as_single
 
-NEAR = wp.constant(8.0)
-"""Unit space: distance from the middle beyond which a ray's way to the object is taken in float64."""
+SPHERE = wp.constant(wp.float64(1.75))
+"""Radius of a sphere about the unit cube."""
 
 LEAVING = wp.constant(wp.float64(1.0e-6))
 """How far above its own triangle a ray leaves, unit space: 16 roundings of a float32. A point of
@@ -42,33 +42,13 @@ def into_unit(record: ObjectRecord, origin: wp.vec3d, direction: wp.vec3) -> Uni
 
 
 @wp.func
-def is_near(start: wp.vec3) -> bool:
-    """Whether a ray's start is near the object, where float32 does for it."""
-    return wp.abs(start[0]) <= NEAR and wp.abs(start[1]) <= NEAR and wp.abs(start[2]) <= NEAR
-
-
-@wp.func
-def distance_skipped(start: wp.vec3d, way: wp.vec3) -> wp.float64:
-    """How far a ray may go in float64 before it can meet the object's bulk; 0 for one that starts near."""
-    if is_near(as_single(start)):
-        return wp.float64(0.0)
-    return wp.max(-wp.dot(start, as_double(way)) - wp.float64(NEAR), wp.float64(0.0))
-
-
-@wp.func
-def skipped_to(start: wp.vec3d, way: wp.vec3, skipped: wp.float64) -> wp.vec3:
-    """Where a ray is after so much of its way."""
-    return as_single(start + skipped * as_double(way))
-
-
-@wp.func
-def aimed_start(start: wp.vec3d, direction: wp.vec3, way: wp.vec3) -> wp.vec3d:
-    """A ray's start, moved aside so that along ``way``, the unit vector in float32, it comes to the object where
-    it does along ``direction`` itself. The rounding of a unit vector is as large as an object that is so far away."""
-    if is_near(as_single(start)):
-        return start
-    exact = wp.normalize(as_double(direction))
-    return start + wp.max(-wp.dot(start, exact), wp.float64(0.0)) * (exact - as_double(way))
+def distance_passed(origin: wp.vec3d, direction: wp.vec3) -> float:
+    """How far, in lengths of ``direction``, a ray may go before it comes to the unit cube: in float64, which rounds
+    its start the less the nearer it has come."""
+    way = as_double(direction)
+    square = wp.dot(way, way)
+    along = -wp.dot(origin, way) - SPHERE * wp.sqrt(square)
+    return float(wp.max(along, wp.float64(0.0)) / square)
 
 
 @wp.func

@@ -21,9 +21,9 @@ from ldtrefl.cli import main
 from ldtrefl.cubemap import texel_frame
 from ldtrefl.device_scene import DeviceMesh
 from ldtrefl.fingerprint import fingerprint
-from ldtrefl.grid_check import check_grid
 from ldtrefl.ldt import peel_mesh
 from ldtrefl.peel import check_fragments, check_order
+from ldtrefl.tree_check import check_tree
 
 from .conftest import SMALL_SCENE
 
@@ -170,57 +170,70 @@ def as_float(bits: int) -> float:
 
 
 @pytest.mark.parametrize("trusted", [False, True])
-def test_a_grid_is_checked_in_every_field(cache: MapCache, trusted: bool) -> None:
+def test_a_tree_is_checked_in_every_field(cache: MapCache, trusted: bool) -> None:
     quality = "balanced" if trusted else "exact"
     geometry, entry, _ = stored(quality, trusted=trusted)
     count = len(geometry.faces)
-    check_grid(entry.arrays, entry.values, count)
-    assert entry.values["patches"] == trusted
-    row, rows = entry.arrays["row"], entry.arrays["rows"]
-    of_patches = int(np.flatnonzero(np.diff(row)[0::2])[0]) if trusted else -1
-    record = 8 * (int(row[2 * of_patches]) + 6) if trusted else 8 * (int(row[1]) + 12)
-    box = short_box(entry)
+    check_tree(entry.arrays, entry.values, count)
+    assert (entry.values["half_patch"] > 0.0) == trusted
+    nodes, rows = entry.arrays["nodes"], entry.arrays["rows"]
+    children = np.ascontiguousarray(nodes.reshape(-1, 56)[:, 48:]).view(np.int32)
+    boxes = nodes.reshape(-1, 56)[:, :8]
+    of_block, lane = np.argwhere(children < 0)[-1]
+    block = 56 * int(of_block) + 48 + int(lane)
+    code = int(~children[of_block, lane])
+    inner = 48 + int(np.flatnonzero((children[0] > 0) & (boxes[0] < 1e29))[0])
+    unused = np.argwhere(boxes > 1e29)[0]
+    number = 8 * ((code >> 1) + (6 if code & 1 else 9))
     wrong = {
-        "leaps": [entry.arrays["leaps"][:-1], entry.arrays["leaps"].astype(np.int32)],
-        "node": [changed(entry.arrays["node"], -1, 2**30), changed(entry.arrays["node"], 1, -5)],
-        "row": [changed(row, -1, 2**30), changed(row, len(row) // 2, 2**30), changed(row, 0, 1), row[:-2], row // 2],
-        "boxes": [entry.arrays["boxes"][:-48], changed(entry.arrays["boxes"], box, 0.0)],
-        "rows": [rows[:-8], rows.astype(np.float64), rows.reshape(2, -1)]
-        + [changed(rows, record, as_float(bits)) for bits in (count, 2**30, -1, -(2**31))],
+        "nodes": [nodes[:-56], nodes[:-1], nodes[:0], nodes.astype(np.float64), nodes.reshape(1, -1)]
+        + [changed(nodes, block, as_float(~bits)) for bits in (code + 2, code ^ 1, 2**31 - 1, code - 2, 0)]
+        + [changed(nodes, block, as_float(child)) for child in (0, len(children) - 1, len(children), 2**30)]
+        + [changed(nodes, inner, as_float(child)) for child in (0, len(children), 2**30, -(2**31))]
+        + [changed(nodes, 56 * int(unused[0]) + int(unused[1]), 0.0)],
+        "rows": [rows[:-8], rows[:-80], rows[:-1], rows.astype(np.float64), rows.reshape(2, -1)]
+        + [changed(rows, number, as_float(bits)) for bits in (count, 2**30, -1, -(2**31))],
     }
-    if trusted:
-        wrong["rows"] += [changed(rows, record + 8, as_float(kind)) for kind in (3, 7, 8, -1, 2**30)]
     for name, others in wrong.items():
         for other in others:
             with pytest.raises((ValueError, KeyError, TypeError)):
-                check_grid({**entry.arrays, name: other}, entry.values, count)
+                check_tree({**entry.arrays, name: other}, entry.values, count)
     for name in entry.arrays:
         with pytest.raises(KeyError):
-            check_grid({n: a for n, a in entry.arrays.items() if n != name}, entry.values, count)
+            check_tree({n: a for n, a in entry.arrays.items() if n != name}, entry.values, count)
     for name, others in {
-        "cells": [[0, 1, 1], [2**16, 2**16, 1], [1, 1], [8.0, 8, 8], None],
         "low": [[0.0, float("nan"), 0.0], [1e30] * 3, [99.0] * 3, "low"],
-        "high": [[float("inf")] * 3, [-99.0] * 3],
-        "cell_offset": [[0.0, 0.0], [float("nan")] * 3],
+        "high": [[float("inf")] * 3, [-99.0] * 3, [0.0, 0.0]],
         "front": [0.5, float("nan"), None],
-        "half_patch": [-1.0, float("inf")],
+        "half_patch": [-1.0, float("inf")] + ([0.0] if trusted else []),
         "horizon": [-1.0, float("nan")] + ([0.0, 1e-30] if entry.values["front"] else []),
-        "cells_per_unit": [0.0, -1.0, 1e-30, float("inf")],
         "records": [-1, 1.5, 2**40, True],
-        "patches": [1, None],
     }.items():
         for value in others:
             with pytest.raises((ValueError, TypeError)):
-                check_grid(entry.arrays, {**entry.values, name: value}, count)
+                check_tree(entry.arrays, {**entry.values, name: value}, count)
         with pytest.raises(KeyError):
-            check_grid(entry.arrays, {n: v for n, v in entry.values.items() if n != name}, count)
+            check_tree(entry.arrays, {n: v for n, v in entry.values.items() if n != name}, count)
 
 
-def short_box(entry: Entry) -> int:
-    """The place of a low side of a box that no block has."""
-    boxes = entry.arrays["boxes"].reshape(-1, 6, 8)
-    node, _, lane = np.argwhere(boxes[:, 0:1] > 1e29)[0]
-    return int(48 * node + lane)
+def test_a_tree_that_is_too_deep_is_refused(cache: MapCache) -> None:
+    """Nodes one in the other: a ray would leave more behind than it can hold."""
+    for depth in (32, 33):
+        nodes = np.zeros((depth, 56), np.float32)
+        nodes[:, 8:16] = nodes[:, 24:32] = nodes[:, 40:48] = 1.0
+        children = nodes[:, 48:].view(np.int32)
+        blocks = np.arange(7 * depth).reshape(depth, 7)
+        children[:, :7] = ~(2 * 10 * blocks)
+        children[:, 7] = np.arange(1, depth + 1)
+        children[-1, 7] = ~(2 * 10 * 7 * depth)
+        rows = np.zeros((70 * depth + 10) * 8, np.float32)
+        values = {"low": [0.0] * 3, "high": [1.0] * 3, "front": 0.0, "half_patch": 0.0, "horizon": 0.0, "records": 1}
+        arrays = {"nodes": nodes.reshape(-1), "rows": rows}
+        if 8 * depth <= 256:
+            check_tree(arrays, values, 1)
+        else:
+            with pytest.raises(ValueError, match="more to come back to"):
+                check_tree(arrays, values, 1)
 
 
 def test_maps_are_checked_in_every_field(cache: MapCache) -> None:
@@ -256,7 +269,7 @@ def test_a_crafted_file_is_made_anew(cache: MapCache, caplog: pytest.LogCaptureF
     rays = rays_about(geometry.mesh, 200)
     truth = peel_mesh(geometry, 32, quality="exact").trace(*rays)
     for arrays, values in (
-        ({**entry.arrays, "row": changed(entry.arrays["row"], -1, 2**30)}, entry.values),
+        ({**entry.arrays, "rows": entry.arrays["rows"][:-8]}, entry.values),
         (entry.arrays, {}),
         ({}, entry.values),
     ):
@@ -266,10 +279,12 @@ def test_a_crafted_file_is_made_anew(cache: MapCache, caplog: pytest.LogCaptureF
         np.testing.assert_array_equal(again.trace(*rays).t, truth.t)
         said = [record.getMessage() for record in caplog.records]
         assert not again.from_cache and len(said) == 1 and "made anew" in said[0] and key in said[0]
-    assert peel_mesh(geometry, 32, quality="exact").grid and len(cache.files()) == 1
+    assert peel_mesh(geometry, 32, quality="exact").tree and len(cache.files()) == 1
 
 
-@pytest.mark.parametrize("module", ["grid_build", "patches", "pieces", "doubts", "raster", "march_exact", "grid"])
+@pytest.mark.parametrize(
+    "module", ["items", "patches", "pieces", "doubts", "raster", "tree_build", "tree_walk", "tree"]
+)
 def test_every_constant_is_part_of_the_key(module: str, monkeypatch: pytest.MonkeyPatch) -> None:
     before = fingerprint("ldt")
     found = importlib.import_module(f"ldtrefl.{module}")
@@ -288,10 +303,10 @@ def test_every_constant_is_part_of_the_key(module: str, monkeypatch: pytest.Monk
     assert fingerprint("ldt") == before
 
 
-def test_a_grid_of_other_constants_is_not_taken_for_current(cache: MapCache, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_tree_of_other_constants_is_not_taken_for_current(cache: MapCache, monkeypatch: pytest.MonkeyPatch) -> None:
     mesh = shapes.make("torus_knot", KNOT)
     ldtrefl.peel(mesh.vertices, mesh.faces)
-    monkeypatch.setattr("ldtrefl.grid_build.CELLS_PER_ROOT", 0.05)
+    monkeypatch.setattr("ldtrefl.tree_build.CELLS_PER_ROOT", 0.05)
     other = ldtrefl.peel(mesh.vertices, mesh.faces)
     assert not other.from_cache and len(cache.files()) == 2
 
@@ -311,7 +326,7 @@ def test_the_source_is_part_of_the_key(tmp_path: Path) -> None:
         spec.loader.exec_module(module)
         return str(module.fingerprint("ldt"))
 
-    keys = [key_after(name) for name in (None, "march_exact.h", "patches.py", "binning.py", "ldt.py")]
+    keys = [key_after(name) for name in (None, "tree_walk.h", "vectors.h", "patches.py", "binning.py", "ldt.py")]
     assert len(set(keys)) == len(keys) and keys[0] == fingerprint("ldt")
     assert key_after("cli.py") == keys[-1]
 

@@ -202,7 +202,7 @@ def test_with_shadows_maps_are_as_fine_as_what_is_seen() -> None:
 
 
 @pytest.mark.parametrize("options", [{"error": 1.0}, {"error": 1.0, "max_bounces": 3}], ids=str)
-@pytest.mark.parametrize("skip", ["bounds", "bounds,maps", "bounds,regions,leaps"])
+@pytest.mark.parametrize("skip", ["bounds", "bounds,maps", "bounds,regions,attributes"])
 def test_resolutions_do_not_depend_on_what_is_skipped(skip: str, options: dict[str, Any]) -> None:
     whole = scene(
         objects=(

@@ -178,7 +178,7 @@ def test_command_line_refuses_in_one_line(scene_file: Path) -> None:
         (("render", "scene.toml", "--method", "nope"), "unknown method 'nope'"),
         (("render", "scene.toml", "--set", "resolution=-1"), "resolution"),
         (("render", "scene.toml", "--set", "resolution"), "OPTION=VALUE"),
-        (("render", "scene.toml", "--set", "skip=regions,lepas"), "did you mean 'leaps'"),
+        (("render", "scene.toml", "--set", "skip=regions,bonds"), "did you mean 'bounds'"),
         (("render", "scene.toml", "--set", "skip=[1]"), "expected all, none, or names"),
         (("render", "scene.toml", "--set", "error=0"), "error: should be greater than 0"),
         (("render", "scene.toml", "--set", "cull=none"), "'safe' or 'flat'"),

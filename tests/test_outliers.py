@@ -10,7 +10,7 @@ from stress_cases import outliers
 from stress_cases.judge import Outcome, brute_force
 
 import ldtrefl
-from ldtrefl import grid_build, shapes
+from ldtrefl import shapes, tree_build
 
 
 def test_an_outlier_changes_no_answer_and_a_wrong_one_is_found() -> None:
@@ -43,8 +43,8 @@ import numpy as np, ldtrefl
 from ldtrefl import shapes
 knot = shapes.make("torus_knot", {"segments": [2000, 125]})
 maps = ldtrefl.peel(knot.vertices, knot.faces)
-assert maps.grid.patches and maps.grid.view.front != 0.0
-maps.grid.view.horizon = 0.0
+assert maps.tree.patches and maps.tree.view.front != 0.0
+maps.tree.view.horizon = 0.0
 rng = np.random.default_rng(0)
 inside = knot.vertices[rng.integers(0, len(knot.vertices), 50_000)] * 0.999
 hits = maps.trace(inside, rng.normal(size=inside.shape))
@@ -55,19 +55,11 @@ print((hits.triangle >= 0).sum())
     assert int(done.stdout) > 10_000
 
 
-def test_a_grid_with_too_many_records_becomes_coarser(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Triangles as large as their mesh lie in thousands of cells each; the answers stay."""
-    rng = np.random.default_rng(0)
-    vertices, faces = rng.uniform(-1, 1, (3000, 3)), np.arange(3000).reshape(-1, 3)
-    origins, directions = rng.normal(size=(500, 3)), rng.normal(size=(500, 3))
-    fine = ldtrefl.peel(vertices, faces)
-    monkeypatch.setattr(grid_build, "MOST_RECORDS", fine.grid.records // 3)
-    coarse = ldtrefl.peel(vertices, faces)
-    assert coarse.grid.records <= fine.grid.records // 3 and max(coarse.grid.view.cells) < max(fine.grid.view.cells)
-    np.testing.assert_array_equal(coarse.trace(origins, directions).triangle, fine.trace(origins, directions).triangle)
-    monkeypatch.setattr(grid_build, "MOST_RECORDS", 10)
+def test_more_triangles_than_memory_allows_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    vertices = np.random.default_rng(0).uniform(-1, 1, (3000, 3))
+    monkeypatch.setattr(tree_build, "MOST_RECORDS", 10)
     with pytest.raises(ldtrefl.InputError, match="the mesh has 1000 triangles, too many to search"):
-        ldtrefl.peel(vertices, faces)
+        ldtrefl.peel(vertices, np.arange(3000).reshape(-1, 3))
 
 
 def test_more_triangles_than_an_int32_numbers_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -41,7 +41,6 @@ COUNTERS = {
     "regions": "searches",
     "maps": "map_bytes",
     "bounds": "searches",
-    "leaps": "steps",
     "attributes": "attribute_bytes",
     "frames": "rays",
 }

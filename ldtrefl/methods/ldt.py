@@ -6,8 +6,8 @@ regions on the reflectors are culled (section 3.2); the remaining pixels' rays a
 
     ldtrefl render scene.toml --method ldt --set resolution=256
 
-The default search is our own (``grid.py``): it walks the occupied cells and tests the triangles in them, or the texels
-where many triangles share one. ``search=linear`` is the paper's.
+The default search is our own (``tree.py``): it goes down a tree over the triangles, or over the texels where many
+triangles share one. ``search=linear`` is the paper's.
 
 Fails: ``search=linear`` misses what is thinner than a step or a texel, and its silhouettes are as coarse as texels;
 ``quality=fast`` loses a little at silhouettes.
@@ -23,7 +23,7 @@ from pydantic.dataclasses import dataclass
 from ldtrefl.cull import Culled, CullTest, cull_rays, not_culled
 from ldtrefl.device_scene import DeviceMesh, DeviceScene
 from ldtrefl.gbuffer import GBuffer
-from ldtrefl.grid_build import Quality
+from ldtrefl.items import Quality
 from ldtrefl.kept import Followed
 from ldtrefl.launch import Stats
 from ldtrefl.ldt import (
@@ -69,7 +69,7 @@ class Ldt(Method):
         error: Annotated[float, Field(gt=0.0, le=64.0)] | None = None
         """Pixels that reflected points and shadows may be off by: resolutions are chosen for what is seen."""
         search: Literal["exact", "linear"] = "exact"
-        """How a ray is searched for: exact (a walk through occupied cells), linear (the paper's)."""
+        """How a ray is searched for: exact (down a tree over the surface), linear (the paper's)."""
         quality: Quality = DEFAULT_QUALITY
         """Of the exact search: exact (every triangle), balanced (texels where triangles are finer), fast (texels)."""
         linear_steps: Annotated[int, Field(strict=True, ge=1, le=100_000)] = LINEAR_STEPS
@@ -211,8 +211,6 @@ class Ldt(Method):
         for mesh, maps in current.items():
             if maps is None:
                 of_mesh[mesh] = tracer.view()
-            elif search == "exact" and not self.skips.leaps:
-                of_mesh[mesh] = maps.grid.view_without_leaps
             else:
                 of_mesh[mesh] = maps.view(search, **steps)
         views = [of_mesh[entry.geometry] for entry in self.scene.objects]

@@ -18,7 +18,7 @@ from timing import timed_in_turn
 import ldtrefl
 from ldtrefl import launch
 from ldtrefl.device_scene import DeviceMesh
-from ldtrefl.grid_build import Quality
+from ldtrefl.items import Quality
 from ldtrefl.ldt import peel_mesh
 from ldtrefl.march import TRACERS
 from ldtrefl.raycast import BVH, Raycaster

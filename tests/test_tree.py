@@ -1,4 +1,4 @@
-"""The exact walk: every quality against the ray caster, and what lies at the limits of the grid."""
+"""The exact search: every quality against the ray caster, and what lies at its limits."""
 
 from collections.abc import Callable
 
@@ -49,7 +49,7 @@ def test_exact_finds_what_the_raycaster_finds(mesh_or_shape: Callable, name: str
 def test_dense_meshes_become_patches(quality: str, wrong_hits: float, wrong_misses: float, p99: float) -> None:
     mesh = shapes.make("torus_knot", DENSE_KNOT)
     maps = ldtrefl.peel(mesh.vertices, mesh.faces, quality=quality)
-    assert maps.grid.patches and maps.nbytes < 16_000_000
+    assert maps.tree.patches and maps.nbytes < 16_000_000
     found = differences(mesh, maps, 60_000, 6)
     assert found["wrong_hits"] <= wrong_hits, found
     assert found["wrong_misses"] <= wrong_misses, found
@@ -79,7 +79,7 @@ def test_rough_surfaces_stay_triangles(quality: str) -> None:
     mesh = rough_ball(0.003)
     maps = ldtrefl.peel(mesh.vertices, mesh.faces, 128, quality=quality)
     smooth = rough_ball(0.0)
-    assert ldtrefl.peel(smooth.vertices, smooth.faces, 128, quality=quality).grid.patches and not maps.grid.patches
+    assert ldtrefl.peel(smooth.vertices, smooth.faces, 128, quality=quality).tree.patches and not maps.tree.patches
     found = differences(mesh, maps, 60_000, 8)
     assert found["wrong_hits"] + found["wrong_misses"] <= 0.01 and found["p99"] < 0.01, found
 
@@ -88,7 +88,7 @@ def test_rough_surfaces_stay_triangles(quality: str) -> None:
 def test_patches_end_at_edges(quality: str, wrong: float) -> None:
     mesh = many_triangled_box()
     maps = ldtrefl.peel(mesh.vertices, mesh.faces, quality=quality)
-    assert maps.grid.patches
+    assert maps.tree.patches
     found = differences(mesh, maps, 100_000, 9)
     assert found["wrong_hits"] <= wrong and found["wrong_misses"] <= 0.05 and found["p99"] <= 0.2, found
 
@@ -107,7 +107,7 @@ def test_patches_show_their_front(wound: str) -> None:
     mesh = shapes.make("torus_knot", DENSE_KNOT)
     faces = {"outwards": mesh.faces, "inwards": mesh.faces[:, ::-1], "open": mesh.faces[:-1]}[wound]
     maps = ldtrefl.peel(mesh.vertices, faces)
-    assert maps.grid.view.front == {"outwards": 1, "inwards": -1, "open": 0}[wound]
+    assert maps.tree.view.front == {"outwards": 1, "inwards": -1, "open": 0}[wound]
     origins, directions = rays_from_outside(100_000, 7)
     hits = maps.trace(origins, directions)
     out = (hits.normal * directions).sum(axis=1) * (-1 if wound == "inwards" else 1)
@@ -125,7 +125,7 @@ def test_patches_do_not_lose_what_is_thin_or_large() -> None:
     faces = [knot.faces, wires.faces + offset, [np.arange(3) + offset + len(wires.vertices)]]
     mesh = ldtrefl.Mesh(vertices, np.concatenate(faces))
     maps = ldtrefl.peel(mesh.vertices, mesh.faces)
-    assert maps.grid.patches
+    assert maps.tree.patches
     rng = np.random.default_rng(0)
     targets = wires.vertices[wires.faces[rng.integers(0, len(wires.faces), 4000)]].mean(axis=1) + below
     origins = np.tile(np.array([[0.3, 0.2, -3.0]]), (len(targets), 1))
@@ -189,8 +189,8 @@ def test_same_bits_for_any_number_of_threads() -> None:
         rows = []
         for threads in (1, 2, 5):
             ldtrefl.set_threads(threads)
-            view = ldtrefl.peel(mesh.vertices, mesh.faces).grid.view
-            rows.append([getattr(view, name).numpy().copy() for name in ("leaps", "node", "row", "boxes", "rows")])
+            view = ldtrefl.peel(mesh.vertices, mesh.faces).tree.view
+            rows.append([getattr(view, name).numpy().copy() for name in ("nodes", "rows")])
         for other in rows[1:]:
             for a, b in zip(rows[0], other, strict=True):
                 np.testing.assert_array_equal(a, b)

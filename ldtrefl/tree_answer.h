@@ -1,0 +1,121 @@
+// What a ray's record says of its hit, and second thoughts about patches (tree_walk.py).
+
+struct TreeAnswer : TreeWalk {
+    struct Answer {
+        float t;
+        int triangle;
+        float u, v;  // -1, or LARGE_PATCH, of a patch
+        float normal[3];  // unit
+    };
+
+    SHARED float dot(const float* a, const float* b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+    SHARED double dot(const double* a, const double* b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+    SHARED void cross(const double* a, const double* b, double* made) {
+        for (int k = 0; k < 3; ++k) {
+            const int i = k == 2 ? 0 : k + 1, j = k == 0 ? 2 : k - 1;
+            made[k] = a[i] * b[j] - a[j] * b[i];
+        }
+    }
+    SHARED double within(double x, double most) { return x > 0.0 ? (x < most ? x : most) : 0.0; }
+
+    // Have memory bring the record that a ray has met, all its rows.
+    SHARED void fetch_record(const Tree& tree, const Rays& rays, int lane) {
+#if !defined(PLAIN_VECTORS)
+        if (rays.met[lane] < 0) return;
+        const float* r = tree.rows + rays.met[lane] / LANES * LANES;
+        for (int line = 0; line < 5; ++line) __builtin_prefetch(r + 16 * line);
+#endif
+    }
+
+    // What ray ``lane`` of eight has met.
+    SHARED Answer to(const Tree& tree, const Rays& rays, int lane, const Query& query) {
+        const float* r = tree.rows + rays.met[lane];
+        const float t = (float)(rays.skipped[lane] + rays.nearest[lane]);
+        return rays.met_patch[lane] ? on_patch(r, t) : on_triangle(r, t, query);
+    }
+
+    SHARED Answer on_patch(const float* r, float t) {
+        Answer answer;
+        answer.t = t;
+        answer.triangle = as_int(r[PATCH_NUMBER * LANES]);
+        const float axis = r[PATCH_KIND * LANES];
+        answer.u = answer.v = axis > (float)(int)axis ? LARGE_PATCH : -1.0f;
+        for (int k = 0; k < 3; ++k) answer.normal[k] = r[k * LANES];
+        return answer;
+    }
+
+    // In float64, by the triple products of Moeller and Trumbore 1997: of a slim triangle float32 leaves the point within
+    // it to chance, and the normal.
+    SHARED Answer on_triangle(const float* r, float t, const Query& query) {
+        double from[3], way[3], edge_u[3], edge_v[3], across[3], normal[3];
+        for (int k = 0; k < 3; ++k) {
+            const double corner = r[k * LANES];
+            edge_u[k] = r[(3 + k) * LANES] - corner;
+            edge_v[k] = r[(6 + k) * LANES] - corner;
+            from[k] = query.origin[k] - corner;
+            way[k] = query.direction[k];
+        }
+        cross(edge_u, edge_v, normal);
+        cross(from, way, across);
+        const double slope = dot(normal, way);
+        Answer answer;
+        answer.t = t;
+        answer.u = answer.v = 1.0f / 3.0f;
+        if (slope != 0.0) {
+            const double inverse = -1.0 / slope;
+            answer.t = (float)within(dot(normal, from) * inverse, INFINITY);
+            const double u = within(dot(across, edge_v) * inverse, 1.0);
+            answer.u = (float)u;
+            answer.v = (float)within(-dot(across, edge_u) * inverse, 1.0 - u);
+        }
+        const double square = dot(normal, normal), per_length = square > 0.0 ? 1.0 / sqrt(square) : 0.0;
+        for (int k = 0; k < 3; ++k) answer.normal[k] = (float)(normal[k] * per_length);
+        answer.triangle = as_int(r[TRIANGLE_NUMBER * LANES]);
+        return answer;
+    }
+
+    // How far along the back of a surface a ray goes: above 0 it comes from within. ``front`` is the side of the normals
+    // that can be seen from outside, 1 or -1.
+    SHARED float facing(const Answer& answer, const float* direction, float front) {
+        return front * dot(answer.normal, direction) / sqrtf(dot(direction, direction));
+    }
+    SHARED bool is_doubted(const Answer& answer, const float* direction, float front) {
+        const float back = facing(answer, direction, front);
+        return back > 0.0f && back < GRAZING;
+    }
+
+    // A ray that is in doubt. If it started inside, any other ray from there meets a back too: one is sent to see. If
+    // not, it goes on, past the horizon. The answer's triangle is -1 if nothing is met there.
+    OUT_OF_LINE int go_beyond(const Tree& tree, const Query& query, float front, float horizon, Answer& answer) {
+        Query onwards = query, probe = query;
+        double behind = 0.0;  // t of where ``onwards`` begins
+        Rays rays;
+        int steps = 0;
+        for (int doubts = 0; doubts < MOST_DOUBTS && is_doubted(answer, query.direction, front); ++doubts) {
+            for (int k = 0; k < 3; ++k) {
+                const int i = k == 2 ? 0 : k + 1, j = k == 0 ? 2 : k - 1;
+                probe.origin[k] = onwards.origin[k];
+                probe.direction[k] = query.direction[i] * answer.normal[j] - query.direction[j] * answer.normal[i];
+            }
+            probe.t_max = FAR;
+            if (finds(rays, tree, probe, steps) && facing(to(tree, rays, 0, probe), probe.direction, front) > 0.0f) break;
+            // By more than t's rounding, so that it does go on.
+            const float past = (float)(answer.t - behind);
+            const double passed = past + greater(horizon, T_ROUNDING * past);
+            behind += passed;
+            for (int k = 0; k < 3; ++k) onwards.origin[k] += passed * (double)query.direction[k];
+            onwards.t_max = (float)(query.t_max - behind);
+            answer.triangle = -1;
+            if (!finds(rays, tree, onwards, steps)) break;
+            answer = to(tree, rays, 0, onwards);
+            answer.t = (float)(behind + answer.t);
+        }
+        return steps;
+    }
+    SHARED bool finds(Rays& rays, const Tree& tree, const Query& query, int& steps) {
+        if (!start(rays, tree, &query, 1)) return false;
+        find_nearest(tree, rays, 0, 0);
+        steps += rays.steps[0];
+        return rays.met[0] >= 0;
+    }
+};

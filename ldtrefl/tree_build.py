@@ -1,0 +1,522 @@
+"""Records -> tree (``tree.py``), on all cores.
+
+items -> cells -> parts of the cells by the surface area heuristic, on one thread -> parts of the items of each, on all
+-> eight parts a node -> blocks and nodes
+
+Items are first sorted into a grid, so that the upper levels of the tree, which one thread builds, are found from a few
+thousand cells. The lower levels of each group of cells are then built beside the others'.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from ldtrefl import launch
+from ldtrefl.binning import bin_items
+from ldtrefl.budget import memory_limit
+from ldtrefl.device_scene import DeviceMesh
+from ldtrefl.errors import InputError
+from ldtrefl.pieces import LARGE, Piece, high_corner, low_corner
+from ldtrefl.tree import (
+    BOX_MARGIN,
+    LANES,
+    LARGE_AXIS,
+    NODE,
+    PATCH_ROWS,
+    STACK,
+    TRIANGLE_ROWS,
+    Tree,
+    TreeView,
+    aligned_empty,
+)
+
+CELLS_PER_ROOT = 0.13
+"""Cells along the longest side per square root of the items, so that some twenty lie in an occupied one. From 0.08 to
+0.2 trees are as fast, within 3%, and building takes as long."""
+MOST_CELLS = 128
+GROUP = wp.constant(512)
+"""Items of a group of cells, but where one cell holds more: some fit in a core's first cache."""
+BYTES_PER_RECORD = 80
+"""What a record takes, and what it is made from, at most."""
+MOST_RECORDS = 100_000_000
+"""Records of a tree: the numbers of rows fit in an int32 with their kind."""
+EMPTY = 1.0e30
+"""Sides of a box with nothing in it: its low is above its high."""
+SHORTEST = 1.0e-30
+"""Length that no box that is split is shorter than."""
+
+
+@wp.struct
+class Items:
+    """What records are made from. Items from 0 on are triangles, below 0 patches: -1 is patch 0."""
+
+    numbers: wp.array(dtype=wp.int32)  # empty: all triangles
+    vertices: wp.array(dtype=wp.vec3)  # unit space
+    faces: wp.array(dtype=wp.vec3i)
+    patches: wp.array(dtype=Piece)
+    unit_per_cell: float  # of the cells that patches are given in
+    unit_offset: wp.vec3
+
+
+@wp.struct
+class Reference:
+    """A box to be put into the tree, as ``tree_build.h`` has it."""
+
+    low: wp.vec4  # and the bits of its number
+    high: wp.vec4  # and how many items lie in it
+
+
+@wp.struct
+class Node:
+    """A node of a binary tree, as ``tree_build.h`` has it."""
+
+    low: wp.vec4  # and the bits of the number of a part, or of a leaf's first reference
+    high: wp.vec4  # and those of the other part's, or of a leaf's ~count
+
+
+@wp.struct
+class Cells:
+    """The grid that items are sorted into."""
+
+    low: wp.vec3
+    per_unit: float
+    size: wp.vec3i
+
+
+@wp.func
+def item_number(items: Items, i: int) -> int:
+    """The ``i``-th item."""
+    if items.numbers.shape[0] > 0:
+        return items.numbers[i]
+    return i
+
+
+@wp.func
+def unit_piece(items: Items, item: int) -> Piece:
+    """A patch in unit space."""
+    piece = items.patches[-1 - item]
+    piece.corner = items.unit_per_cell * piece.corner + items.unit_offset
+    piece.edge_u = items.unit_per_cell * piece.edge_u
+    piece.edge_v = items.unit_per_cell * piece.edge_v
+    return piece
+
+
+@wp.func
+def reference_to(items: Items, item: int) -> Reference:
+    """The box about an item."""
+    low, high = wp.vec3(0.0), wp.vec3(0.0)
+    if item >= 0:
+        corners = items.faces[item]
+        a, b, c = items.vertices[corners[0]], items.vertices[corners[1]], items.vertices[corners[2]]
+        low, high = wp.min(a, wp.min(b, c)), wp.max(a, wp.max(b, c))
+    else:
+        piece = unit_piece(items, item)
+        low, high = low_corner(piece), high_corner(piece)
+    made = Reference()
+    made.low = wp.vec4(low[0], low[1], low[2], wp.cast(item, wp.float32))
+    made.high = wp.vec4(high[0], high[1], high[2], 1.0)
+    return made
+
+
+@wp.func
+def cell_along(x: float, cells: int) -> int:
+    """The cell that holds a coordinate; the nearest if none does."""
+    return wp.clamp(int(x), 0, cells - 1)
+
+
+@launch.kernel
+def number_cells(
+    first: int,
+    # In:
+    items: Items,
+    cells: Cells,
+    # Out:
+    cell_out: wp.array(dtype=wp.int32),
+):
+    i = first + wp.tid()
+    box = reference_to(items, item_number(items, i))
+    x = cell_along(cells.per_unit * (0.5 * (box.low[0] + box.high[0]) - cells.low[0]), cells.size[0])
+    y = cell_along(cells.per_unit * (0.5 * (box.low[1] + box.high[1]) - cells.low[1]), cells.size[1])
+    z = cell_along(cells.per_unit * (0.5 * (box.low[2] + box.high[2]) - cells.low[2]), cells.size[2])
+    cell_out[i] = (z * cells.size[1] + y) * cells.size[0] + x
+
+
+@launch.kernel
+def put_in_order(
+    first: int,
+    # In:
+    items: Items,
+    cell: wp.array(dtype=wp.int32),
+    start: wp.array(dtype=wp.int32),
+    ranks: wp.array(dtype=wp.int32),
+    # Out:
+    item_out: wp.array(dtype=wp.int32),
+):
+    i = first + wp.tid()
+    item_out[start[cell[i]] + ranks[i]] = item_number(items, i)
+
+
+@launch.kernel
+def measure_cells(
+    first: int,
+    # In:
+    items: Items,
+    item: wp.array(dtype=wp.int32),  # in the order of their cells
+    occupied: wp.array(dtype=wp.int32),
+    start: wp.array(dtype=wp.int32),
+    # Out:
+    reference_out: wp.array(dtype=Reference),
+):
+    i = first + wp.tid()
+    begin, end = start[occupied[i]], start[occupied[i] + 1]
+    made = reference_to(items, item[begin])
+    for k in range(begin + 1, end):
+        one = reference_to(items, item[k])
+        made.low = wp.min(made.low, one.low)
+        made.high = wp.max(made.high, one.high)
+    made.low[3] = wp.cast(occupied[i], wp.float32)
+    made.high[3] = float(end - begin)
+    reference_out[i] = made
+
+
+def _native(body: str) -> str:
+    """C++ of ``tree_build.h`` and a call of it."""
+    folder = Path(__file__).parent
+    constants = f"constexpr float EMPTY = {EMPTY!r}f, SHORTEST = {SHORTEST!r}f; constexpr int TREE_STACK = {STACK};"
+    return "\n".join([constants, *((folder / name).read_text() for name in ("vectors.h", "tree_build.h")), body])
+
+
+SPLIT = """
+    return TreeBuild::split_all(
+        (TreeBuild::Reference*)references.data + begin, count, most, are_items != 0, by_halves != 0,
+        (TreeBuild::Node*)nodes.data + root, root + 1, first
+    );
+"""
+
+
+@wp.func_native(_native(SPLIT))
+def split_all(
+    references: wp.array(dtype=Reference),
+    begin: int,
+    count: int,
+    most: int,
+    are_items: int,
+    by_halves: int,
+    nodes: wp.array(dtype=Node),
+    root: int,
+    first: int,
+) -> wp.int32:
+    """Split ``count`` references from ``begin`` on until at most ``most`` items are left together, and number them from
+    ``first``; nodes go to ``root`` and after it. Their number."""
+    ...
+
+
+@launch.kernel
+def split_cells(
+    first: int,
+    # In and out:
+    references: wp.array(dtype=Reference),
+    # In:
+    by_halves: int,
+    # Out:
+    nodes_out: wp.array(dtype=Node),
+    count_out: wp.array(dtype=wp.int32),
+):
+    count_out[0] = split_all(references, 0, references.shape[0], GROUP, 0, by_halves, nodes_out, 0, 0)
+
+
+@wp.func
+def gather_items(
+    items: Items,
+    item: wp.array(dtype=wp.int32),
+    start: wp.array(dtype=wp.int32),
+    cells: wp.array(dtype=Reference),
+    first_cell: int,
+    cell_count: int,
+    references_out: wp.array(dtype=Reference),
+    place: int,
+):
+    """References to the items of some cells."""
+    at = int(place)
+    for k in range(first_cell, first_cell + cell_count):
+        cell = wp.cast(cells[k].low[3], wp.int32)
+        for i in range(start[cell], start[cell + 1]):
+            references_out[at] = reference_to(items, item[i])
+            at += 1
+
+
+@launch.kernel
+def split_groups(
+    first: int,
+    # In:
+    items: Items,
+    item: wp.array(dtype=wp.int32),
+    start: wp.array(dtype=wp.int32),
+    cells: wp.array(dtype=Reference),
+    groups: wp.array(dtype=wp.vec3i),  # node; first and number of its cells
+    places: wp.array(dtype=wp.int32),  # first item of each group
+    by_halves: int,
+    own_nodes: int,  # where the nodes of the first item's group begin: two an item
+    room: wp.array(dtype=Reference),  # for groups that are too large for the stack
+    rooms: wp.array(dtype=wp.int32),  # where theirs begins
+    # Out:
+    nodes: wp.array(dtype=Node),
+    item_out: wp.array(dtype=wp.int32),
+):
+    g = first + wp.tid()
+    group = groups[g]
+    begin, count = places[g], places[g + 1] - places[g]
+    root = own_nodes + 2 * begin
+    if count <= GROUP:
+        own_room = wp.zeros(shape=GROUP, dtype=Reference)
+        own = wp.array(ptr=own_room.ptr, shape=(GROUP,), dtype=Reference)
+        gather_items(items, item, start, cells, group[1], group[2], own, 0)
+        split_all(own, 0, count, LANES, 1, by_halves, nodes, root, begin)
+        for i in range(count):
+            item_out[begin + i] = wp.cast(own[i].low[3], wp.int32)
+    else:
+        place = rooms[g]
+        gather_items(items, item, start, cells, group[1], group[2], room, place)
+        split_all(room, place, count, LANES, 1, by_halves, nodes, root, begin)
+        for i in range(count):
+            item_out[begin + i] = wp.cast(room[place + i].low[3], wp.int32)
+    nodes[group[0]] = nodes[root]
+
+
+GATHER = """
+    struct Waiting { int node, parent, lane; };
+    const TreeBuild::Node* binary = (const TreeBuild::Node*)nodes.data;
+    Waiting waiting[TREE_STACK];
+    waiting[0] = {0, -1, 0};
+    int top = 1, made = 0, row = 0, most_waiting = 1;
+    while (top) {
+        const Waiting one = waiting[--top];
+        const int node = made++;
+        int* own = parts.data + 8 * node;
+        int* codes = children.data + 8 * node;
+        if (one.parent >= 0) children.data[8 * one.parent + one.lane] = node;
+        const int count = TreeBuild::gather(binary, one.node, own);
+        // What a ray leaves behind on its way here, and what it may leave here.
+        const int left_behind = (one.parent < 0 ? 0 : before.data[one.parent]) + count;
+        before.data[node] = left_behind;
+        if (left_behind > most_waiting) most_waiting = left_behind;
+        if (most_waiting > TREE_STACK) break;
+        for (int lane = 0; lane < 8; ++lane) {
+            codes[lane] = 0;
+            if (lane >= count) own[lane] = -1;
+        }
+        for (int lane = count; lane-- > 0;) {
+            const TreeBuild::Node& part = binary[own[lane]];
+            if (TreeBuild::is_leaf(part)) {
+                const bool is_patch = item.data[TreeBuild::as_int(part.low[3])] < 0;
+                codes[lane] = ~(2 * row + (is_patch ? 1 : 0));
+                row += is_patch ? patch_rows : triangle_rows;
+            } else {
+                waiting[top++] = {own[lane], node, lane};
+            }
+        }
+    }
+    counts.data[0] = made;
+    counts.data[1] = row;
+    counts.data[2] = most_waiting;
+"""
+
+
+@wp.func_native(_native(GATHER))
+def gather_all(
+    nodes: wp.array(dtype=Node),
+    item: wp.array(dtype=wp.int32),
+    patch_rows: int,
+    triangle_rows: int,
+    parts: wp.array(dtype=wp.int32),
+    children: wp.array(dtype=wp.int32),
+    before: wp.array(dtype=wp.int32),
+    counts: wp.array(dtype=wp.int32),
+):
+    """Gather the nodes of the binary tree into those of the wide one, a part before the next."""
+    ...
+
+
+@launch.kernel
+def gather_nodes(
+    first: int,
+    # In:
+    nodes: wp.array(dtype=Node),
+    item: wp.array(dtype=wp.int32),
+    # Out: per wide node the binary nodes of its parts, or -1; its children; what a ray may leave waiting
+    parts_out: wp.array(dtype=wp.int32),
+    children_out: wp.array(dtype=wp.int32),
+    waiting_out: wp.array(dtype=wp.int32),
+    counts_out: wp.array(dtype=wp.int32),  # wide nodes, rows, the most that waits
+):
+    gather_all(nodes, item, PATCH_ROWS, TRIANGLE_ROWS, parts_out, children_out, waiting_out, counts_out)
+
+
+@wp.func
+def write_patch(items: Items, item: int, at: int, rows: wp.array(dtype=float)):
+    """Write a patch into the lane of a block that begins at ``at``."""
+    piece = unit_piece(items, item)
+    middle = piece.corner + 0.5 * (piece.edge_u + piece.edge_v)
+    normal = wp.normalize(wp.cross(piece.edge_u, piece.edge_v))
+    axis = piece.kind % LARGE
+    for k in range(3):
+        rows[at + k * LANES] = normal[k]
+    rows[at + 3 * LANES] = wp.dot(normal, middle)
+    rows[at + 4 * LANES] = middle[(axis + 1) % 3]
+    rows[at + 5 * LANES] = middle[(axis + 2) % 3]
+    rows[at + 6 * LANES] = wp.cast(piece.triangle, wp.float32)
+    rows[at + 7 * LANES] = float(axis) + wp.where(piece.kind >= LARGE, LARGE_AXIS, 0.0)
+
+
+@wp.func
+def write_triangle(items: Items, item: int, at: int, rows: wp.array(dtype=float)):
+    """Write a triangle into the lane of a block that begins at ``at``."""
+    corners = items.faces[item]
+    for corner in range(3):
+        point = items.vertices[corners[corner]]
+        for k in range(3):
+            rows[at + (3 * corner + k) * LANES] = point[k]
+    rows[at + 9 * LANES] = wp.cast(item, wp.float32)
+
+
+@launch.kernel
+def write_nodes(
+    first: int,
+    # In:
+    items: Items,
+    nodes: wp.array(dtype=Node),
+    item: wp.array(dtype=wp.int32),
+    parts: wp.array(dtype=wp.int32),
+    children: wp.array(dtype=wp.int32),
+    # Out:
+    nodes_out: wp.array(dtype=wp.float32),
+    rows_out: wp.array(dtype=wp.float32),
+):
+    i = first + wp.tid()
+    place = NODE * i
+    for lane in range(LANES):
+        part = parts[LANES * i + lane]
+        low, high = wp.vec4(EMPTY), wp.vec4(-EMPTY)
+        if part >= 0:
+            low, high = nodes[part].low - wp.vec4(BOX_MARGIN), nodes[part].high + wp.vec4(BOX_MARGIN)
+        for k in range(3):
+            nodes_out[place + 2 * k * LANES + lane] = low[k]
+            nodes_out[place + (2 * k + 1) * LANES + lane] = high[k]
+        child = children[LANES * i + lane]
+        nodes_out[place + 6 * LANES + lane] = wp.cast(child, wp.float32)
+        if child < 0:
+            begin = wp.cast(nodes[part].low[3], wp.int32)
+            count = ~wp.cast(nodes[part].high[3], wp.int32)
+            at = LANES * (~child >> 1)
+            is_patch = (~child & 1) == 1
+            for k in range(count):
+                if is_patch:
+                    write_patch(items, item[begin + k], at + k, rows_out)
+                else:
+                    write_triangle(items, item[begin + k], at + k, rows_out)
+            for row in range(wp.where(is_patch, PATCH_ROWS, TRIANGLE_ROWS)):
+                for k in range(count, LANES):
+                    rows_out[at + row * LANES + k] = wp.nan
+
+
+def build_tree(items: Any, count: int, box: np.ndarray, geometry: DeviceMesh) -> Tree:
+    """The tree of ``count`` ``Items`` of a mesh; ``box`` is (2, 3), about all, in unit space.
+
+    Raises:
+        InputError: they need more memory than is allowed.
+    """
+    if count > min(MOST_RECORDS, memory_limit() // BYTES_PER_RECORD):
+        raise InputError(
+            f"the mesh has {len(geometry.faces)} triangles, too many to search (--memory allows {memory_limit()} bytes)"
+        )
+    nodes, order = _binary_tree(items, count, box, geometry.vertices.device, by_halves=False)
+    made = _wide_tree(items, nodes, order, geometry)
+    if made is None:
+        # Boxes within boxes, hundreds deep: splitting in halves cannot go so deep.
+        nodes, order = _binary_tree(items, count, box, geometry.vertices.device, by_halves=True)
+        made = _wide_tree(items, nodes, order, geometry)
+        assert made is not None
+    return Tree.of(made, count, geometry)
+
+
+def _binary_tree(
+    items: Any, count: int, box: np.ndarray, device: wp.Device, *, by_halves: bool
+) -> tuple[wp.array, wp.array]:
+    """The nodes of a binary tree, and the items in the order of its leaves."""
+    cells = _cells_about(box, count)
+    cell = wp.empty(count, dtype=wp.int32, device=device)
+    launch.launch(number_cells, count, [items, cells, cell], device)
+    start, ranks = bin_items(cell, math.prod(cells.size), device)
+    item = wp.empty_like(cell)
+    launch.launch(put_in_order, count, [items, cell, start, ranks, item], device)
+    del cell, ranks
+
+    # The upper levels.
+    starts = start.numpy()
+    occupied = wp.array(np.flatnonzero(starts[1:] > starts[:-1]), dtype=wp.int32, device=device)
+    references = wp.empty(occupied.shape[0], dtype=Reference, device=device)
+    launch.launch(measure_cells, occupied.shape[0], [items, item, occupied, start, references], device)
+    nodes = wp.empty(2 * occupied.shape[0] + 2 * count, dtype=Node, device=device)
+    made = wp.empty(1, dtype=wp.int32, device=device)
+    launch.launch(split_cells, 1, [references, int(by_halves), nodes, made], device)
+
+    # The lower ones of each group of cells.
+    own_nodes = int(made.numpy()[0])
+    groups, sizes = _groups(nodes[:own_nodes], references)
+    places = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int32)
+    spacious = np.where(sizes > int(GROUP), sizes, 0)
+    rooms = (np.cumsum(spacious) - spacious).astype(np.int32)
+    room = wp.empty(max(1, int(spacious.sum())), dtype=Reference, device=device)
+    order = wp.empty_like(item)
+    inputs = [items, item, start, references, wp.array(groups, dtype=wp.vec3i, device=device)]
+    inputs += [wp.array(places, device=device), int(by_halves), own_nodes, room, wp.array(rooms, device=device)]
+    launch.launch(split_groups, len(groups), [*inputs, nodes, order], device)
+    return nodes, order
+
+
+def _cells_about(box: np.ndarray, count: int) -> Any:
+    """The grid over a box for so many items."""
+    extent = np.maximum(box[1] - box[0], 0.0)
+    along = min(max(round(CELLS_PER_ROOT * math.sqrt(count)), 1), MOST_CELLS)
+    cells = Cells()
+    cells.low = wp.vec3(*box[0])
+    cells.per_unit = float(along / max(float(extent.max()), SHORTEST))
+    cells.size = wp.vec3i(*(max(1, math.ceil(side * cells.per_unit)) for side in extent))
+    return cells
+
+
+def _groups(nodes: wp.array, references: wp.array) -> tuple[np.ndarray, np.ndarray]:
+    """(n, 3) int32, node and cells of each leaf of the upper levels; (n,) int, its items."""
+    made = nodes.numpy()
+    count = ~np.ascontiguousarray(made["high"][:, 3]).view(np.int32)
+    leaves = np.flatnonzero(count >= 0)
+    first = np.ascontiguousarray(made["low"][leaves, 3]).view(np.int32)
+    weights = np.concatenate([[0], np.cumsum(references.numpy()["high"][:, 3], dtype=np.int64)])
+    sizes = weights[first + count[leaves]] - weights[first]
+    return np.stack([leaves, first, count[leaves]], axis=1).astype(np.int32), sizes
+
+
+def _wide_tree(items: Any, nodes: wp.array, order: wp.array, geometry: DeviceMesh) -> Any:
+    """The ``TreeView`` of a binary tree; None if a ray might have more to come back to than it can hold."""
+    device, count = geometry.vertices.device, order.shape[0]
+    parts, children = (wp.empty(int(LANES) * count, dtype=wp.int32, device=device) for _ in range(2))
+    waiting, counts = wp.empty(count, dtype=wp.int32, device=device), wp.empty(3, dtype=wp.int32, device=device)
+    launch.launch(gather_nodes, 1, [nodes, order, parts, children, waiting, counts], device)
+    node_count, row_count, most_waiting = (int(n) for n in counts.numpy())
+    if most_waiting > STACK:
+        return None
+    view = TreeView()
+    view.nodes = aligned_empty(node_count * int(NODE), device)
+    view.rows = aligned_empty(row_count * int(LANES), device)
+    inputs = [items, nodes, order, parts, children]
+    launch.launch(write_nodes, node_count, [*inputs, view.nodes, view.rows], device)
+    root = nodes[:1].numpy()
+    margin = np.float32(BOX_MARGIN)
+    view.low = wp.vec3(*(root["low"][0, :3] - margin))
+    view.high = wp.vec3(*(root["high"][0, :3] + margin))
+    return view

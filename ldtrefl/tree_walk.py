@@ -1,0 +1,223 @@
+"""Rays against a tree (``tree.py``): the tracer of the exact search.
+
+The walk itself is ``tree_walk.h``: single rays, rays in packets, and rays in turn. Here stands what its answers mean:
+normals, triangles and barycentrics, and the second thoughts about patches. A ray is sent on that grazes the back of a
+closed object's patch: from outside only the front of a closed surface is seen, so it has either passed just over the
+horizon, where the next patch sticks out by its margin, or it started inside.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import warp as wp
+
+from ldtrefl.hit import Hit
+from ldtrefl.shade import barycentrics_at
+from ldtrefl.strays import first_stray
+from ldtrefl.trace import RAY_BLOCK, Query, Tracer
+from ldtrefl.tree import NODE, STACK, TreeView
+from ldtrefl.vectors import as_single, point_along
+
+NEAR = 8.0
+"""Unit space: distance from the middle beyond which a ray's way to the object is taken in float64."""
+
+BOX_SLACK = 1.0e-6
+"""Relative rounding of where a ray enters the box about all, with some to spare: four operations."""
+
+NEGLIGIBLE = 1.0e-18
+"""Component of a direction below which the ray runs along the planes."""
+
+EDGE_ON = 2.0e-7
+"""|n . direction| up to which a patch is seen edge on, to float32's rounding."""
+
+PACKET_SPREAD = 0.25
+"""Unit space: how far the starts, and the directions, of the rays of a packet may lie apart along an axis."""
+
+GRAZING = 0.35
+"""n . direction below which a hit on the back of a closed object's patch is doubted."""
+
+MOST_DOUBTS = 64
+"""Doubted hits of a ray after which the next is taken as it is. Three in a row were never seen."""
+
+T_ROUNDING = 2.4e-7
+"""Two roundings of a float32."""
+
+FAR = 1.0e30
+"""Up to where a probe looks."""
+
+LARGE_PATCH = wp.constant(-2.0)
+"""In place of a barycentric: still to be found, as the triangle is larger than the patch."""
+
+OWN_PATCHES = wp.constant(2.0)
+"""Sides of a patch from its start within which a ray may pass through patches of its own surface: a bent surface has
+left the plane of a patch by then."""
+
+OWN_STEP = wp.constant(1.0 / 16.0)
+"""Sides of a patch by which a search goes on behind such a patch."""
+
+
+def _native(body: str) -> str:
+    """The C++ of ``tree_walk.h`` after the constants that it names, what all calls need, and a call."""
+    folder = Path(__file__).parent
+    lengths = {"BOX_SLACK": BOX_SLACK, "EDGE_ON": EDGE_ON, "NEGLIGIBLE": NEGLIGIBLE, "PACKET_SPREAD": PACKET_SPREAD}
+    lengths |= {"NEAR": NEAR, "GRAZING": GRAZING, "FAR": FAR, "T_ROUNDING": T_ROUNDING, "LARGE_PATCH": LARGE_PATCH}
+    numbers = {"MOST_DOUBTS": MOST_DOUBTS, "TREE_NODE": NODE, "TREE_STACK": STACK, "RAY_BLOCK": RAY_BLOCK}
+    lines = [f"constexpr float {name} = {float(value)!r}f;" for name, value in lengths.items()]
+    lines += [f"constexpr int {name} = {int(value)};" for name, value in numbers.items()]
+    files = [(folder / name).read_text() for name in ("vectors.h", "tree_walk.h", "tree_answer.h")]
+    return "\n".join([*lines, *files, body])
+
+
+TREE = """
+    auto& view = views.data[index];
+    const TreeWalk::Tree tree = {view.nodes.data, view.rows.data, &view.low[0], &view.high[0], view.half_patch};
+    static_assert(sizeof(queries.data[0]) == sizeof(TreeWalk::Query), "a Query as trace.py has it");
+    const TreeWalk::Query* asked = (const TreeWalk::Query*)queries.data;
+    TreeWalk::Rays rays[TreeWalk::EIGHTS];
+"""
+
+SEARCH = """
+    TreeWalk::search(tree, rays, asked, count, view.in_turn != 0, false);
+    for (int i = 0; i < count; ++i) {
+        const TreeWalk::Rays& own = rays[i / TreeWalk::LANES];
+        const int lane = i % TreeWalk::LANES;
+        if (i + 4 < count) TreeAnswer::fetch_record(tree, rays[(i + 4) / TreeWalk::LANES], (i + 4) % TreeWalk::LANES);
+        auto& hit = hits.data[i];
+        hit.steps = own.steps[lane];
+        hit.triangle = -1;
+        hit.t = INFINITY;
+        if (own.met[lane] < 0) continue;
+        TreeAnswer::Answer answer = TreeAnswer::to(tree, own, lane, asked[i]);
+        if (view.front != 0.0f && TreeAnswer::is_doubted(answer, asked[i].direction, view.front))
+            hit.steps += TreeAnswer::go_beyond(tree, asked[i], view.front, view.horizon, answer);
+        hit.triangle = answer.triangle;
+        if (answer.triangle < 0) continue;
+        hit.t = answer.t;
+        hit.u = answer.u;
+        hit.v = answer.v;
+        for (int k = 0; k < 3; ++k) hit.normal[k] = answer.normal[k];
+    }
+"""
+
+SEARCH_FOR_ANY = """
+    TreeWalk::search(tree, rays, asked, count, view.in_turn != 0, true);
+    for (int i = 0; i < count; ++i) {
+        const TreeWalk::Rays& own = rays[i / TreeWalk::LANES];
+        hits.data[i].triangle = own.met[i % TreeWalk::LANES] >= 0 ? 0 : -1;
+        hits.data[i].steps = own.steps[i % TreeWalk::LANES];
+    }
+"""
+
+
+@wp.func_native(_native(TREE + SEARCH))
+def search_tree(
+    views: wp.array(dtype=TreeView),
+    index: int,
+    queries: wp.array(dtype=Query),
+    count: int,
+    hits: wp.array(dtype=Hit),
+):
+    """Find what rays meet; of misses t and the triangle are set."""
+    ...
+
+
+@wp.func_native(_native(TREE + SEARCH_FOR_ANY))
+def search_tree_for_any(
+    views: wp.array(dtype=TreeView),
+    index: int,
+    queries: wp.array(dtype=Query),
+    count: int,
+    hits: wp.array(dtype=Hit),
+):
+    """Find whether rays meet anything: the triangle is 0 if they do, else -1."""
+    ...
+
+
+@wp.func
+def coordinates_under_patch(view: TreeView, triangle: int, query: Query, t: float) -> wp.vec2:
+    """Barycentrics of a hit on a patch in a triangle that is larger than that."""
+    point = as_single(point_along(query.origin, query.direction, t))
+    corners = view.faces[triangle]
+    return barycentrics_at(view.vertices[corners[0]], view.vertices[corners[1]], view.vertices[corners[2]], point)
+
+
+@wp.func
+def closest_hits_exact(
+    views: wp.array(dtype=TreeView), index: int, queries: wp.array(dtype=Query), count: int, hits: wp.array(dtype=Hit)
+):
+    """The tracer's ``closest_hits``."""
+    search_tree(views, index, queries, count, hits)
+    if views[index].half_patch > 0.0:
+        for i in range(count):
+            if hits[i].triangle >= 0 and hits[i].u == LARGE_PATCH:
+                uv = coordinates_under_patch(views[index], hits[i].triangle, queries[i], hits[i].t)
+                hits[i].u = uv[0]
+                hits[i].v = uv[1]
+
+
+@wp.func
+def any_hits_exact(
+    views: wp.array(dtype=TreeView), index: int, queries: wp.array(dtype=Query), count: int, hits: wp.array(dtype=Hit)
+):
+    """The tracer's ``any_hits``. The first hit on a patch may be in doubt, and not count."""
+    if views[index].half_patch > 0.0 and views[index].front != 0.0:
+        search_tree(views, index, queries, count, hits)
+    else:
+        search_tree_for_any(views, index, queries, count, hits)
+
+
+@wp.func
+def is_own_surface(hit: Hit, direction: wp.vec3, outwards: wp.vec3) -> bool:
+    """Whether a ray that has just left a surface passes through what it meets to the same side as it left."""
+    return wp.dot(hit.normal, direction) * wp.dot(hit.normal, outwards) > 0.0
+
+
+@wp.func
+def occluded_exact(views: wp.array(dtype=TreeView), index: int, query: Query, outwards: wp.vec3) -> bool:
+    """The tracer's ``occluded``.
+
+    A ray may start under the patches that stand for its own surface. It then passes through them from within, close to
+    its start: those are not met.
+    """
+    query_room, hit_room = wp.zeros(shape=1, dtype=Query), wp.zeros(shape=1, dtype=Hit)
+    queries = wp.array(ptr=query_room.ptr, shape=(1,), dtype=Query)
+    hits = wp.array(ptr=hit_room.ptr, shape=(1,), dtype=Hit)
+    queries[0] = query
+    side = 2.0 * views[index].half_patch
+    if side == 0.0 or outwards == wp.vec3(0.0):
+        any_hits_exact(views, index, queries, 1, hits)
+        return hits[0].triangle >= 0
+    passed = float(0.0)
+    while passed <= OWN_PATCHES * side:
+        queries[0].origin = point_along(query.origin, query.direction, passed)
+        queries[0].t_max = query.t_max - passed
+        search_tree(views, index, queries, 1, hits)
+        if hits[0].triangle < 0:
+            return False
+        if passed + hits[0].t >= OWN_PATCHES * side or not is_own_surface(hits[0], query.direction, outwards):
+            return True
+        passed += hits[0].t + OWN_STEP * side
+    queries[0].origin = point_along(query.origin, query.direction, passed)
+    queries[0].t_max = query.t_max - passed
+    any_hits_exact(views, index, queries, 1, hits)
+    return hits[0].triangle >= 0
+
+
+@wp.func
+def stray_hit_exact(
+    views: wp.array(dtype=TreeView), index: int, origin: wp.vec3d, direction: wp.vec3, t_max: float
+) -> Hit:
+    """The tracer's ``stray_hit``."""
+    return first_stray(views[index].strays, origin, direction, t_max)
+
+
+@wp.func
+def stray_count_exact(views: wp.array(dtype=TreeView), index: int) -> int:
+    """The tracer's ``stray_count``."""
+    return views[index].strays.shape[0]
+
+
+EXACT = Tracer(
+    "exact", TreeView, closest_hits_exact, any_hits_exact, occluded_exact, stray_hit_exact, stray_count_exact
+)
