@@ -132,12 +132,13 @@ def _look_of(mesh: Mesh, texture: np.ndarray | None, device: wp.Device) -> Look:
 
 
 class DeviceMesh:
-    """A mesh's arrays on a device; what only shading needs when it is asked for."""
+    """A mesh's arrays on a device; what only shading needs when it is asked for. On the CPU they are the mesh's own,
+    which nobody writes."""
 
     def __init__(self, mesh: Mesh, device: wp.Device) -> None:
         self.mesh = mesh
-        self.vertices = wp.array(mesh.unit_vertices, dtype=wp.vec3, device=device)
-        self.faces = wp.array(mesh.faces, dtype=wp.vec3i, device=device)
+        self.vertices = wp.array(mesh.unit_vertices, dtype=wp.vec3, device=device, copy=False)
+        self.faces = wp.array(mesh.faces, dtype=wp.vec3i, device=device, copy=False)
         self._looks: dict[int, tuple[np.ndarray | None, Look]] = {}
         """By ``id`` of the texture, which is kept beside."""
 
@@ -151,18 +152,18 @@ class DeviceMesh:
         """(n,) vec3d in unit space if the mesh has strays, else empty: float32 then holds for all of it."""
         centre, half = self.mesh.unit_frame
         exact = (self.mesh.vertices - centre) / half if len(self.mesh.strays) else np.zeros((0, 3))
-        return wp.array(exact, dtype=wp.vec3d, device=self.vertices.device)
+        return wp.array(exact, dtype=wp.vec3d, device=self.vertices.device, copy=False)
 
     @functools.cached_property
     def normals(self) -> wp.array:
         """(n,) vec3 shading normals."""
-        return wp.array(self.mesh.normals, dtype=wp.vec3, device=self.vertices.device)
+        return wp.array(self.mesh.normals, dtype=wp.vec3, device=self.vertices.device, copy=False)
 
     @functools.cached_property
     def uvs(self) -> wp.array:
         """(n,) vec2 texture coordinates, none if the mesh has none."""
         uvs = np.zeros((0, 2), np.float32) if self.mesh.uvs is None else self.mesh.uvs
-        return wp.array(uvs, dtype=wp.vec2, device=self.vertices.device)
+        return wp.array(uvs, dtype=wp.vec2, device=self.vertices.device, copy=False)
 
     @functools.cached_property
     def no_uvs(self) -> wp.array:

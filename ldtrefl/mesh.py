@@ -12,16 +12,16 @@ from typing import Any
 
 import numpy as np
 
-from ldtrefl.bulk import stray_triangles
+from ldtrefl.bulk import split_strays
 from ldtrefl.errors import InputError
+from ldtrefl.mesh_passes import copied_faces, copied_vertices, fitted_vertices, is_constant
 from ldtrefl.normals import vertex_normals
 
 MAX_TRIANGLES = 1 << 30
 """Triangle numbers are int32 and a fragment keeps one bit of it for the facing."""
 
-
-LARGEST_COORDINATE = 1e100
-"""Sizes and their squares stay finite in float64."""
+MOST_VERTICES = (1 << 31) - 1
+"""Vertices are numbered by int32."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +36,10 @@ class Part:
 
 
 class Mesh:
-    """A checked triangle mesh. Its arrays are copies of those given, and read-only: what is made of them is kept.
+    """A checked triangle mesh. Its arrays are read-only: what is made of them is kept.
+
+    They are copies of those given. Only an array of the right type that is read-only, as is all that it is a view of,
+    is taken as it is: such as another mesh's.
 
     Raises:
         InputError: no triangles, an index out of range, a vertex that is not finite, or shapes that do not fit.
@@ -50,25 +53,23 @@ class Mesh:
         uvs: Any = None,
         parts: tuple[Part, ...] = (Part(),),
     ) -> None:
-        self.vertices = _array(vertices, np.float64, 3, "vertices")
-        """(n, 3) float64."""
-        checked = _indices(faces)
-        if len(checked) == 0:
+        given, corners = _coordinates(vertices), _indices(faces)
+        for count, most, what in ((len(corners), MAX_TRIANGLES, "triangles"), (len(given), MOST_VERTICES, "vertices")):
+            if count > most:
+                raise InputError(f"the mesh has {count} {what}, at most {most} allowed")
+        if len(corners) == 0:
             raise InputError("the mesh has no triangles")
-        if len(checked) > MAX_TRIANGLES:
-            raise InputError(f"the mesh has {len(checked)} triangles, at most {MAX_TRIANGLES} allowed")
-        wrong = np.flatnonzero(((checked < 0) | (checked >= len(self.vertices))).any(axis=1))
-        if len(wrong):
-            first = int(wrong[0])
+        self.faces, self.is_used, wrong = copied_faces(corners, len(given))
+        """(m, 3) int32; (n,) bool: vertices that a triangle has."""
+        if wrong is not None:
             raise InputError(
-                f"triangle {first} has vertices {checked[first].tolist()}, allowed are 0 to {len(self.vertices) - 1}"
+                f"triangle {wrong} has vertices {corners[wrong].tolist()}, allowed are 0 to {len(given) - 1}"
             )
-        wrong = np.flatnonzero(~(np.abs(self.vertices) <= LARGEST_COORDINATE).all(axis=1))
-        if len(wrong):
-            first = int(wrong[0])
-            raise InputError(f"vertex {first} is not finite or too large: {self.vertices[first].tolist()}")
-        self.faces = checked.astype(np.int32, copy=False)
-        """(m, 3) int32."""
+        self.vertices, self.bounds, wrong = copied_vertices(given, self.is_used)
+        """(n, 3) float64; (2, 3) float64: the lowest and highest corner of the triangles' box (unused vertices left
+        out)."""
+        if wrong is not None:
+            raise InputError(f"vertex {wrong} is not finite or too large: {given[wrong].tolist()}")
         if normals is not None:
             self.normals = _array(normals, np.float32, 3, "normals")
         self.uvs = None if uvs is None else _array(uvs, np.float32, 2, "uvs")
@@ -77,9 +78,8 @@ class Mesh:
         for name, values in (("normals", None if normals is None else self.normals), ("uvs", self.uvs)):
             if values is not None and len(values) != len(self.vertices):
                 raise InputError(f"{len(values)} {name} for {len(self.vertices)} vertices")
-        for array in (self.vertices, self.faces, None if normals is None else self.normals, self.uvs):
-            if array is not None:
-                array.flags.writeable = False
+        for array in (self.vertices, self.faces, self.is_used, self.bounds):
+            array.flags.writeable = False
 
     @functools.cached_property
     def normals(self) -> np.ndarray:
@@ -87,30 +87,18 @@ class Mesh:
         return _read_only(vertex_normals(self.vertices, self.faces))
 
     @functools.cached_property
-    def is_used(self) -> np.ndarray:
-        """(n,) bool: vertices that a triangle has."""
-        used = np.zeros(len(self.vertices), bool)
-        used[self.faces] = True
-        return _read_only(used)
+    def _split(self) -> tuple[np.ndarray, np.ndarray]:
+        return split_strays(self.vertices, self.faces, self.bounds)
 
-    @functools.cached_property
-    def bounds(self) -> np.ndarray:
-        """(2, 3) float64: the lowest and highest corner of the triangles' box (unused vertices left out)."""
-        used = self.vertices[self.is_used]
-        return _read_only(np.stack([used.min(axis=0), used.max(axis=0)]))
-
-    @functools.cached_property
+    @property
     def strays(self) -> np.ndarray:
         """(k,) int32: the few triangles far outside the bulk, most often none."""
-        return stray_triangles(self.vertices, self.faces, self.bounds)
+        return self._split[0]
 
-    @functools.cached_property
+    @property
     def bulk(self) -> np.ndarray:
         """(2, 3) float64: the lowest and highest corner of the box about all triangles but the strays."""
-        if len(self.strays) == 0:
-            return self.bounds
-        corners = self.vertices[np.delete(self.faces, self.strays, axis=0)].reshape(-1, 3)
-        return np.stack([corners.min(axis=0), corners.max(axis=0)])
+        return self._split[1]
 
     @functools.cached_property
     def unit_frame(self) -> tuple[np.ndarray, float]:
@@ -123,7 +111,7 @@ class Mesh:
     def unit_vertices(self) -> np.ndarray:
         """(n, 3) float32 in the unit frame. The shift is done in float64, so a far-off mesh loses nothing."""
         centre, half = self.unit_frame
-        return _read_only(np.clip((self.vertices - centre) / half, -1e30, 1e30).astype(np.float32))
+        return _read_only(fitted_vertices(self.vertices, centre, half))
 
 
 def _read_only(array: np.ndarray) -> np.ndarray:
@@ -132,17 +120,36 @@ def _read_only(array: np.ndarray) -> np.ndarray:
 
 
 def _array(values: Any, dtype: type, width: int, name: str) -> np.ndarray:
+    """(n, width) read-only: the values themselves if nobody changes them, or else a copy."""
+    if isinstance(values, np.ndarray) and is_constant(values, dtype):
+        return _shaped(np.asarray(values), width, name)
     try:
-        # A copy, whatever is given: the caller's array stays the caller's.
         array: np.ndarray = np.array(values, dtype, order="C")
     except (TypeError, ValueError) as error:
         raise InputError(f"{name} must be numbers of shape (n, {width}), got {type(values).__name__}") from error
+    return _read_only(_shaped(array, width, name))
+
+
+def _shaped(array: np.ndarray, width: int, name: str) -> np.ndarray:
     if array.ndim != 2 or array.shape[1] != width:
         raise InputError(f"{name} must have shape (n, {width}), got {array.shape}")
     return array
 
 
+def _is_one_of(array: np.ndarray, *dtypes: type) -> bool:
+    """Whether kernels can read an array of one of these types where it lies."""
+    return array.dtype in dtypes and array.flags.aligned
+
+
+def _coordinates(values: Any) -> np.ndarray:
+    """(n, 3) float32 or float64, not copied if it is that."""
+    if isinstance(values, np.ndarray) and _is_one_of(values, np.float32, np.float64):
+        return _shaped(np.asarray(values), 3, "vertices")
+    return _array(values, np.float64, 3, "vertices")
+
+
 def _indices(values: Any) -> np.ndarray:
+    """(m, 3) int32 or int64, not copied if it is that."""
     try:
         array = np.asarray(values)
         if array.size == 0:
@@ -154,9 +161,4 @@ def _indices(values: Any) -> np.ndarray:
             array = whole
     except (TypeError, ValueError, OverflowError) as error:
         raise InputError("faces must be whole numbers of shape (m, 3)") from error
-    return _array(array, np.int32 if _fits_int32(array) else np.int64, 3, "faces")
-
-
-def _fits_int32(array: np.ndarray) -> bool:
-    limits = np.iinfo(np.int32)
-    return limits.min <= int(array.min()) and int(array.max()) <= limits.max
+    return _shaped(array if _is_one_of(array, np.int32, np.int64) else array.astype(np.int64), 3, "faces")

@@ -53,6 +53,8 @@ def first_stray(strays: wp.array(dtype=StrayTriangle), origin: wp.vec3d, directi
 
 def stray_array(mesh: Mesh, device: wp.Device) -> wp.array:
     """(k,) ``StrayTriangle`` of a mesh, on a device."""
+    if len(mesh.strays) == 0:
+        return wp.empty(0, dtype=StrayTriangle, device=device)
     centre, half = mesh.unit_frame
     a, b, c = np.moveaxis((mesh.vertices[mesh.faces[mesh.strays]] - centre) / half, 1, 0)
     made = []
@@ -61,6 +63,4 @@ def stray_array(mesh: Mesh, device: wp.Device) -> wp.array:
         record.a, record.triangle = wp.vec3d(*a[k]), triangle
         record.edge_u, record.edge_v = wp.vec3d(*(b[k] - a[k])), wp.vec3d(*(c[k] - a[k]))
         made.append(record)
-    if not made:
-        return wp.empty(0, dtype=StrayTriangle, device=device)
     return wp.array(made, dtype=StrayTriangle, device=device)

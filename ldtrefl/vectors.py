@@ -27,3 +27,19 @@ def from_to(a: wp.vec3d, b: wp.vec3d) -> wp.vec3:
 def point_along(origin: wp.vec3d, direction: wp.vec3, t: float) -> wp.vec3d:
     """``origin + t * direction`` in float64."""
     return origin + wp.float64(t) * as_double(direction)
+
+
+@wp.func
+def low_side(a: wp.vec3d, b: wp.vec3d) -> wp.vec3d:
+    """The smaller of each coordinate; of -0 and 0 that of ``b``. Comparisons, where ``wp.min`` calls the C library."""
+    return wp.vec3d(
+        wp.where(a[0] < b[0], a[0], b[0]), wp.where(a[1] < b[1], a[1], b[1]), wp.where(a[2] < b[2], a[2], b[2])
+    )
+
+
+@wp.func
+def high_side(a: wp.vec3d, b: wp.vec3d) -> wp.vec3d:
+    """The larger of each coordinate; of -0 and 0 that of ``b``."""
+    return wp.vec3d(
+        wp.where(a[0] > b[0], a[0], b[0]), wp.where(a[1] > b[1], a[1], b[1]), wp.where(a[2] > b[2], a[2], b[2])
+    )

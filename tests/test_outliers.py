@@ -86,3 +86,29 @@ def test_a_bulk_too_small_to_be_seen_is_no_trouble(size: float) -> None:
     scene = ldtrefl.Scene(camera=camera, objects=(ball, thing), **lit)
     for method in ("ldt", "bvh"):
         assert np.isfinite(ldtrefl.render(scene, method).image).all()
+
+
+def test_strays_are_found_wherever_they_stand_and_the_bulk_is_the_rest() -> None:
+    knot = shapes.make("torus_knot", {"segments": [200, 20]})
+    n, m = len(knot.vertices), len(knot.faces)
+    far = np.array([[0.0, 0.0, 300.0], [1.0, 0.0, 300.0], [0.0, 1.0, 300.0]])
+    for places in ([0], [m], [0, 1023, 1024, 4095, 4096, m + 5], list(range(64))):
+        faces = np.insert(knot.faces, np.array(places) - np.arange(len(places)), [n, n + 1, n + 2], axis=0)
+        mesh = ldtrefl.Mesh(np.vstack([knot.vertices, far]), faces)
+        assert mesh.strays.tolist() == places
+        assert np.array_equal(mesh.bulk, knot.bounds)
+        assert mesh.bounds[1, 2] == 300.0
+    faces = np.vstack([knot.faces, np.tile([n, n + 1, n + 2], (65, 1))])
+    mesh = ldtrefl.Mesh(np.vstack([knot.vertices, far]), faces)
+    assert len(mesh.strays) == 0 and mesh.bulk is mesh.bounds
+
+
+def test_of_triangles_that_all_reach_far_out_none_is_a_stray() -> None:
+    """The first corners lie together, the others do not: there is no bulk."""
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 100, 0], [0, 0, 100], [0, 100, 1], [1, 0, 100]], float)
+    faces = np.array([[0, 2, 3], [1, 4, 5]])
+    mesh = ldtrefl.Mesh(vertices, faces)
+    assert len(mesh.strays) == 0 and mesh.bulk is mesh.bounds
+    for maker in (ldtrefl.peel, ldtrefl.Raycaster):
+        hits = maker(vertices, faces).trace([[-5.0, 30.0, 30.0]], [[1.0, 0.0, 0.0]])
+        assert hits.triangle.tolist() == [0] and abs(hits.t[0] - 5.0) < 1e-4
