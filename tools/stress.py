@@ -54,6 +54,7 @@ CASES: dict[str, tuple[Size, Size]] = {  # name of the module -> full and quick 
     "hostile": (Size(0, 1000), Size(0, 3)),
     "outliers": (Size(4000, 0), Size(200, 0)),
     "shadows": (Size(0, 320), Size(0, 96)),
+    "edges": (Size(1_000_000, 0), Size(20_000, 0)),
 }
 
 
