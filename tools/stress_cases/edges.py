@@ -55,10 +55,10 @@ def held(by: str, kind: str) -> Held:
     if by != "bvh":
         return Held()
     if kind == "through":
-        return Held(
-            0.01, "Warp's tree lets one in 300 rays aimed exactly at a vertex or an edge pass between two boxes"
-        )
-    return Held(0.001, "the same for one in thousands, and directions are rounded to float32's unit vectors")
+        return Held(0.01, "Warp's tree lets one in 300 rays aimed exactly at a vertex or an edge pass between boxes")
+    if kind == "from afar":
+        return Held(0.01, "directions and starts are rounded to float32, which is 4e-7 of the size there")
+    return Held(0.001, "both of the above, for one in thousands")
 
 
 def run(rays: int, pictures: int) -> list[Outcome]:

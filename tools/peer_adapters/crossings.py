@@ -1,0 +1,111 @@
+"""All crossings of a ray with a mesh, by a tracer that answers first hits: it goes on from each as rays leave surfaces.
+
+Other libraries' rays are float64 and ours float32, so the mesh is traced about the middle of its box.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+import ldtrefl
+from ldtrefl.unit_rays import LEAVING
+
+AT_ONCE = 1_000_000
+"""Rays traced together: some hundred MB."""
+
+MOST = 1000
+"""Crossings of a ray after which it is given up."""
+
+SAME_PLACE = 8.0
+"""Times ``LEAVING``, how far apart along the ray two crossings of one edge may be found."""
+
+
+def tracer_named(name: str, mesh: ldtrefl.Mesh) -> Any:
+    """What has ``trace``: the ray caster for ``"bvh"``, else maps of that quality."""
+    if name == "bvh":
+        return ldtrefl.Raycaster(mesh.vertices, mesh.faces)
+    return ldtrefl.peel(mesh.vertices, mesh.faces, quality=name)
+
+
+@dataclass(frozen=True)
+class Crossings:
+    """(k,) crossings, those of a ray one after the other, rays in order."""
+
+    ray: np.ndarray
+    triangle: np.ndarray
+    t: np.ndarray
+    """float64, in lengths of the ray's direction."""
+    barycentrics: np.ndarray
+    """(k, 2) weights of the second and third corner."""
+
+
+class Target:
+    """A mesh and a tracer of it."""
+
+    def __init__(self, by: str, vertices: np.ndarray, faces: np.ndarray) -> None:
+        vertices = np.asarray(vertices, float)
+        self.middle = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
+        self.mesh = ldtrefl.Mesh(vertices - self.middle, faces)
+        self.tracer = tracer_named(by, self.mesh)
+        a, b, c = np.moveaxis(self.mesh.vertices[self.mesh.faces], 1, 0)
+        normals = np.cross(b - a, c - a)
+        self._corner, self._normals = a, normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+        self._lift = float(LEAVING) * self.mesh.unit_frame[1]
+
+    def first(self, origins: np.ndarray, directions: np.ndarray) -> ldtrefl.Hits:
+        """First hits of (n, 3) float64 rays."""
+        parts = []
+        for i in range(0, max(len(origins), 1), AT_ONCE):
+            some = (origins[i : i + AT_ONCE] - self.middle).astype(np.float32)
+            parts.append(self.tracer.trace(some, directions[i : i + AT_ONCE].astype(np.float32)))
+        names = ("t", "normal", "triangle", "barycentrics")
+        return ldtrefl.Hits(*(np.concatenate([getattr(part, name) for part in parts]) for name in names), 0)
+
+    def occluded(self, origins: np.ndarray, directions: np.ndarray, t_max: float) -> np.ndarray:
+        """(n,) bool: whether something is met before ``t_max``."""
+        if hasattr(self.tracer, "occluded"):
+            some = (origins - self.middle).astype(np.float32), directions.astype(np.float32)
+            return np.asarray(self.tracer.occluded(*some, t_max=t_max))
+        return self.first(origins, directions).t < t_max
+
+    def on_plane(self, triangle: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """(n, 3) points moved into the planes of their triangles, as float32 distances leave them a little off."""
+        normal = self._normals[triangle]
+        height = ((points - self.middle - self._corner[triangle]) * normal).sum(axis=1, keepdims=True)
+        return points - height * normal
+
+    def crossings(self, origins: np.ndarray, directions: np.ndarray) -> Crossings:
+        """Every crossing of (n, 3) float64 rays.
+
+        From a hit a ray goes on where ``unit_rays.start_above_own`` lets rays leave a triangle, to the side that it
+        goes to. What lies ``SAME_PLACE`` from there and faces the same way is the neighbour across an edge or a vertex,
+        in which the ray crosses the surface once.
+        """
+        squared = (directions * directions).sum(axis=1)
+        length = np.sqrt(squared)
+        start, live = origins.copy(), np.arange(len(origins))
+        t_last, side_last = np.full(len(origins), -np.inf), np.zeros(len(origins))
+        found: list[tuple[np.ndarray, ...]] = []
+        for _ in range(MOST):
+            hits = self.first(start[live], directions[live])
+            hit = hits.triangle >= 0
+            live, triangle, barycentrics = live[hit], hits.triangle[hit], hits.barycentrics[hit]
+            if not len(live):
+                break
+            way, normal = directions[live], self._normals[triangle]
+            point = self.on_plane(triangle, start[live] + hits.t[hit, None].astype(float) * way)
+            t = ((point - origins[live]) * way).sum(axis=1) / squared[live]
+            side = np.where((normal * way).sum(axis=1) >= 0.0, 1.0, -1.0)
+            near = (t - t_last[live]) * length[live] <= SAME_PLACE * self._lift
+            is_new = ~(near & (side == side_last[live]))
+            found.append((live[is_new], triangle[is_new], t[is_new], barycentrics[is_new]))
+            t_last[live], side_last[live] = t, side
+            start[live] = point + side[:, None] * self._lift * normal
+        if not found:
+            return Crossings(np.zeros(0, int), np.zeros(0, int), np.zeros(0), np.zeros((0, 2)))
+        ray, triangle, t, barycentrics = (np.concatenate(part) for part in zip(*found, strict=True))
+        order = np.argsort(ray, kind="stable")
+        return Crossings(ray[order], triangle[order], t[order], barycentrics[order])
