@@ -11,14 +11,14 @@ says which. Exit status 1 if a test fails.
 from __future__ import annotations
 
 import argparse
+import importlib
 import subprocess
 import sys
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-
-TRACERS = ("exact", "balanced", "bvh")
+from peer_adapters.crossings import TRACERS
 
 SUITES = {
     "trimesh": ("tests/test_ray.py", "tests/test_ray_upstream.py"),
@@ -53,11 +53,8 @@ class Recorder:
 
 def run_child(suite: str, by: str, root: Path) -> int:
     """Run a suite in this process by a tracer."""
-    if suite == "trimesh":
-        from peer_adapters import for_trimesh as adapter  # noqa: PLC0415
-    else:
-        from peer_adapters import for_open3d as adapter  # noqa: PLC0415
-    adapter.install(by)
+    # Each adapter replaces parts of a library: no process needs both.
+    importlib.import_module(f"peer_adapters.for_{suite}").install(by)
     files = [str(root / name) for name in SUITES[suite] if (root / name).is_file()]
     options = ["-q", "-p", "no:cacheprovider", "-c", "/dev/null", f"--rootdir={root}", "-W", "ignore"]
     return int(pytest.main([*options, *files], plugins=[Recorder(root)]))
@@ -82,7 +79,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     for suite, files in SUITES.items():
         parser.add_argument(f"--{suite}", type=Path, help=f"a checkout that has {files[0]}")
-    parser.add_argument("--tracers", nargs="+", choices=TRACERS, default=TRACERS)
+    parser.add_argument("--tracers", nargs="+", choices=TRACERS, default=list(TRACERS))
     parser.add_argument("--child", nargs=3, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.child:

@@ -5,6 +5,8 @@ Other libraries' rays are float64 and ours float32, so the mesh is traced about 
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,11 +25,12 @@ SAME_PLACE = 8.0
 """Times ``LEAVING``, how far apart along the ray two crossings of one edge may be found."""
 
 
-def tracer_named(name: str, mesh: ldtrefl.Mesh) -> Any:
-    """What has ``trace``: the ray caster for ``"bvh"``, else maps of that quality."""
-    if name == "bvh":
-        return ldtrefl.Raycaster(mesh.vertices, mesh.faces)
-    return ldtrefl.peel(mesh.vertices, mesh.faces, quality=name)
+TRACERS: dict[str, Callable[[np.ndarray, np.ndarray], Any]] = {
+    "exact": functools.partial(ldtrefl.peel, quality="exact"),
+    "balanced": ldtrefl.peel,
+    "bvh": ldtrefl.Raycaster,
+}
+"""By name what makes a tracer of vertices and faces."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +52,7 @@ class Target:
         vertices = np.asarray(vertices, float)
         self.middle = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
         self.mesh = ldtrefl.Mesh(vertices - self.middle, faces)
-        self.tracer = tracer_named(by, self.mesh)
+        self.tracer = TRACERS[by](self.mesh.vertices, self.mesh.faces)
         a, b, c = np.moveaxis(self.mesh.vertices[self.mesh.faces], 1, 0)
         normals = np.cross(b - a, c - a)
         self._corner, self._normals = a, normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
@@ -62,7 +65,8 @@ class Target:
             some = (origins[i : i + AT_ONCE] - self.middle).astype(np.float32)
             parts.append(self.tracer.trace(some, directions[i : i + AT_ONCE].astype(np.float32)))
         names = ("t", "normal", "triangle", "barycentrics")
-        return ldtrefl.Hits(*(np.concatenate([getattr(part, name) for part in parts]) for name in names), 0)
+        t, normal, triangle, barycentrics = (np.concatenate([getattr(part, name) for part in parts]) for name in names)
+        return ldtrefl.Hits(t, normal, triangle, barycentrics, sum(part.invalid for part in parts))
 
     def occluded(self, origins: np.ndarray, directions: np.ndarray, t_max: float) -> np.ndarray:
         """(n,) bool: whether something is met before ``t_max``."""

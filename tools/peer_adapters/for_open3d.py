@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sys
 from types import ModuleType, SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -29,7 +29,8 @@ class Tensor(np.ndarray):
 
     def __new__(cls, values: Any, dtype: Any = None, device: Any = None) -> Tensor:
         """An array of a copy of the values."""
-        return np.array(values, dtype).view(cls)
+        made: Any = np.array(values, dtype).view(cls)
+        return cast(Tensor, made)
 
     @staticmethod
     def from_numpy(array: np.ndarray) -> Tensor:
