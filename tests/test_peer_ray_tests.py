@@ -57,7 +57,7 @@ def test_every_crossing_is_found_once(by: str) -> None:
 
 @pytest.mark.parametrize("by", TRACERS)
 def test_trimesh_intersector_agrees_with_trimesh_itself(by: str) -> None:
-    """trimesh's own, in float64, on random rays through a ball; and it follows a mesh that changes."""
+    """Random rays through a ball, by Embree there; and ours follows a mesh that changes."""
     ours = type("Ours", (RayMeshIntersector,), {"by": by})
     ball = trimesh.creation.icosphere(subdivisions=2)
     rng = np.random.default_rng(0)

@@ -29,13 +29,12 @@ class Tensor(np.ndarray):
 
     def __new__(cls, values: Any, dtype: Any = None, device: Any = None) -> Tensor:
         """An array of a copy of the values."""
-        made: Any = np.array(values, dtype).view(cls)
-        return cast(Tensor, made)
+        return np.array(values, dtype).view(cls)
 
     @staticmethod
     def from_numpy(array: np.ndarray) -> Tensor:
         """The array seen as a tensor."""
-        return array.view(Tensor)
+        return cast(Tensor, array.view(Tensor))
 
     def __getitem__(self, key: Any) -> Any:
         """A tensor, of one number too."""
@@ -43,7 +42,7 @@ class Tensor(np.ndarray):
 
     def to(self, target: Any) -> Tensor:
         """Another kind of number, or the same on a device."""
-        return self if isinstance(target, str) else self.astype(target)
+        return self if isinstance(target, str) else Tensor(self, target)
 
     def cpu(self) -> Tensor:
         """Itself."""
