@@ -8,16 +8,6 @@ struct TreeAnswer : TreeWalk {
         float normal[3];  // unit
     };
 
-    SHARED float dot(const float* a, const float* b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-    SHARED double dot(const double* a, const double* b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-    SHARED void cross(const double* a, const double* b, double* made) {
-        for (int k = 0; k < 3; ++k) {
-            const int i = k == 2 ? 0 : k + 1, j = k == 0 ? 2 : k - 1;
-            made[k] = a[i] * b[j] - a[j] * b[i];
-        }
-    }
-    SHARED double within(double x, double most) { return x > 0.0 ? (x < most ? x : most) : 0.0; }
-
     // Have memory bring the record that a ray has met, all its rows.
     SHARED void fetch_record(const Tree& tree, const Rays& rays, int lane) {
 #if !defined(PLAIN_VECTORS)
@@ -28,50 +18,34 @@ struct TreeAnswer : TreeWalk {
     }
 
     // What ray ``lane`` of eight has met.
-    SHARED Answer to(const Tree& tree, const Rays& rays, int lane, const Query& query) {
+    SHARED Answer to(const Tree& tree, const Rays& rays, int lane) {
         const float* r = tree.rows + rays.met[lane];
-        const float t = (float)(rays.skipped[lane] + rays.nearest[lane]);
-        return rays.met_patch[lane] ? on_patch(r, t) : on_triangle(r, t, query);
-    }
-
-    SHARED Answer on_patch(const float* r, float t) {
         Answer answer;
-        answer.t = t;
-        answer.triangle = as_int(r[PATCH_NUMBER * LANES]);
-        const float axis = r[PATCH_KIND * LANES];
-        answer.u = answer.v = axis > (float)(int)axis ? LARGE_PATCH : -1.0f;
-        for (int k = 0; k < 3; ++k) answer.normal[k] = r[k * LANES];
+        answer.t = greater((float)(rays.skipped[lane] + rays.nearest[lane]), 0.0f);
+        if (rays.met_patch[lane]) {
+            answer.triangle = as_int(r[PATCH_NUMBER * LANES]);
+            const float axis = r[PATCH_KIND * LANES];
+            answer.u = answer.v = axis > (float)(int)axis ? LARGE_PATCH : -1.0f;
+            for (int k = 0; k < 3; ++k) answer.normal[k] = r[k * LANES];
+        } else {
+            answer.triangle = as_int(r[TRIANGLE_NUMBER * LANES]);
+            answer.u = rays.u[lane];
+            answer.v = rays.v[lane];
+            find_normal(r, answer.normal);
+        }
         return answer;
     }
 
-    // In float64, by the triple products of Moeller and Trumbore 1997: of a slim triangle float32 leaves the point within
-    // it to chance, and the normal.
-    SHARED Answer on_triangle(const float* r, float t, const Query& query) {
-        double from[3], way[3], edge_u[3], edge_v[3], across[3], normal[3];
+    // In float64: of a slim triangle's cross product float32 leaves little.
+    SHARED void find_normal(const float* r, float* unit) {
+        double edge_u[3], edge_v[3], normal[3];
         for (int k = 0; k < 3; ++k) {
-            const double corner = r[k * LANES];
-            edge_u[k] = r[(3 + k) * LANES] - corner;
-            edge_v[k] = r[(6 + k) * LANES] - corner;
-            from[k] = query.origin[k] - corner;
-            way[k] = query.direction[k];
+            edge_u[k] = (double)r[(3 + k) * LANES] - r[k * LANES];
+            edge_v[k] = (double)r[(6 + k) * LANES] - r[k * LANES];
         }
         cross(edge_u, edge_v, normal);
-        cross(from, way, across);
-        const double slope = dot(normal, way);
-        Answer answer;
-        answer.t = t;
-        answer.u = answer.v = 1.0f / 3.0f;
-        if (slope != 0.0) {
-            const double inverse = -1.0 / slope;
-            answer.t = (float)within(dot(normal, from) * inverse, INFINITY);
-            const double u = within(dot(across, edge_v) * inverse, 1.0);
-            answer.u = (float)u;
-            answer.v = (float)within(-dot(across, edge_u) * inverse, 1.0 - u);
-        }
         const double square = dot(normal, normal), per_length = square > 0.0 ? 1.0 / sqrt(square) : 0.0;
-        for (int k = 0; k < 3; ++k) answer.normal[k] = (float)(normal[k] * per_length);
-        answer.triangle = as_int(r[TRIANGLE_NUMBER * LANES]);
-        return answer;
+        for (int k = 0; k < 3; ++k) unit[k] = (float)(normal[k] * per_length);
     }
 
     // How far along the back of a surface a ray goes: above 0 it comes from within. ``front`` is the side of the normals
@@ -98,7 +72,7 @@ struct TreeAnswer : TreeWalk {
                 probe.direction[k] = query.direction[i] * answer.normal[j] - query.direction[j] * answer.normal[i];
             }
             probe.t_max = FAR;
-            if (finds(rays, tree, probe, steps) && facing(to(tree, rays, 0, probe), probe.direction, front) > 0.0f) break;
+            if (finds(rays, tree, probe, steps) && facing(to(tree, rays, 0), probe.direction, front) > 0.0f) break;
             // By more than t's rounding, so that it does go on.
             const float past = (float)(answer.t - behind);
             const double passed = past + greater(horizon, T_ROUNDING * past);
@@ -107,7 +81,7 @@ struct TreeAnswer : TreeWalk {
             onwards.t_max = (float)(query.t_max - behind);
             answer.triangle = -1;
             if (!finds(rays, tree, onwards, steps)) break;
-            answer = to(tree, rays, 0, onwards);
+            answer = to(tree, rays, 0);
             answer.t = (float)(behind + answer.t);
         }
         return steps;

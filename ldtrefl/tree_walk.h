@@ -44,7 +44,9 @@ struct TreeWalk : Vectors {
         float inverse[3][LANES], scaled[3][LANES];  // 1 / direction, and origin / direction
         float turned[3][LANES], shear[3][LANES];  // the origin along the axes of ``along``; what turns the last into the ray's
         float nearest[LANES];  // t of what was met, or up to where something is looked for
-        double skipped[LANES];  // t from where it was given to ``origin``
+        const Query* asked;  // of each lane
+        double skipped[LANES];  // t from where it was asked for to ``origin``
+        float u[LANES], v[LANES];  // barycentrics in the triangle that was met
         int near_side[3][LANES];  // in a node; the far side is the other of a pair
         int along[3][LANES];  // rows of a corner's coordinates: across, across, and where the direction is longest
         int met[LANES];  // LANES * row + lane of a record, -1 for nothing
@@ -68,6 +70,7 @@ struct TreeWalk : Vectors {
             rays.met[lane] = -1;
             rays.steps[lane] = 0;
         }
+        rays.asked = queries;
 
         // Slab tests. A ray along planes would reach them in 1e18 boxes.
         const Eight none = eight(0.0f);
@@ -153,21 +156,14 @@ struct TreeWalk : Vectors {
 
     SHARED int far_side(int near_side) { return near_side ^ LANES; }
 
-    // Of lanes at t the nearest is met; of two at one t, and of two blocks, the one that stands first. False if there is
-    // none.
-    SHARED bool keep_nearest(Rays& rays, int ray, const Eight& t, int lanes, int row, bool is_patch) {
-        if (!lanes) return false;
-        float of_lane[LANES];
-        store(of_lane, t);
-        for (; lanes; lanes &= lanes - 1) {
-            const int lane = lowest_bit(lanes), place = LANES * row + lane;
-            if (of_lane[lane] < rays.nearest[ray] || (of_lane[lane] == rays.nearest[ray] && place < rays.met[ray])) {
-                rays.nearest[ray] = of_lane[lane];
-                rays.met[ray] = place;
-                rays.met_patch[ray] = is_patch;
-            }
-        }
-        return true;
+    // Keep a record at t, if it is nearer than what was met; of two at one t the one that stands first.
+    SHARED bool is_nearer(const Rays& rays, int ray, float t, int place) {
+        return t < rays.nearest[ray] || (t == rays.nearest[ray] && place < rays.met[ray]);
+    }
+    SHARED void keep(Rays& rays, int ray, float t, int place, bool is_patch) {
+        rays.nearest[ray] = t;
+        rays.met[ray] = place;
+        rays.met_patch[ray] = is_patch;
     }
 
     // Woop, Benthin and Wald 2013, "Watertight Ray/Triangle Intersection": in coordinates in which the ray is the third
@@ -190,14 +186,77 @@ struct TreeWalk : Vectors {
         const EightFlags inside = (lesser(lesser(u, v), w) >= none) | (greater(greater(u, v), w) <= none);
         ++rays.steps[ray];
         if (!bits(inside)) return false;
-        const Eight area = u + v + w;
-        const Eight t = (u * az + v * bz + w * cz) * eight(rays.shear[2][ray]) / area;
-        const int lanes = bits(inside & (area != none) & (t >= none) & (t <= eight(rays.nearest[ray])));
-        return keep_nearest(rays, ray, t, lanes, row, false);
+        // How far along the ray the corners lie, which t does between them.
+        const Eight scale = eight(rays.shear[2][ray]), slack = eight(DEPTH_SLACK);
+        const Eight a_t = az * scale, b_t = bz * scale, c_t = cz * scale;
+        const Eight first = lesser(lesser(a_t, b_t), c_t) - slack, last = greater(greater(a_t, b_t), c_t) + slack;
+        const EightFlags is_ahead = (first <= eight(rays.nearest[ray])) & (last >= none) & (u + v + w != none);
+        bool is_met = false;
+        for (int lanes = bits(inside & is_ahead); lanes; lanes &= lanes - 1)
+            is_met |= meet_triangle(rows, LANES * row + lowest_bit(lanes), rays, ray);
+        return is_met;
     }
+
     SHARED Eight sheared(Eight across, float shear, Eight along) {
         FUSED
         return across - eight(shear) * along;
+    }
+
+    SHARED float dot(const float* a, const float* b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+    SHARED double dot(const double* a, const double* b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+    SHARED void cross(const double* a, const double* b, double* made) {
+        for (int k = 0; k < 3; ++k) {
+            const int i = k == 2 ? 0 : k + 1, j = k == 0 ? 2 : k - 1;
+            made[k] = a[i] * b[j] - a[j] * b[i];
+        }
+    }
+    SHARED double within(double x, double most) { return x > 0.0 ? (x < most ? x : most) : 0.0; }
+
+    // Where a triangle is met that a ray is known to pass through, in float64, by the triple products of Moeller and
+    // Trumbore 1997: of a slim triangle float32 leaves that to chance.
+    SHARED bool meet_triangle(const float* rows, int place, Rays& rays, int ray) {
+        const float* r = rows + place;
+        const Query& query = rays.asked[ray];
+        double from[3], way[3], edge_u[3], edge_v[3], across[3], normal[3];
+        for (int k = 0; k < 3; ++k) {
+            const double corner = r[k * LANES];
+            edge_u[k] = r[(3 + k) * LANES] - corner;
+            edge_v[k] = r[(6 + k) * LANES] - corner;
+            from[k] = query.origin[k] - corner;
+            way[k] = query.direction[k];
+        }
+        cross(edge_u, edge_v, normal);
+        cross(from, way, across);
+        const double inverse = -1.0 / dot(normal, way);
+        double t = dot(normal, from) * inverse, u = dot(across, edge_v) * inverse, v = -dot(across, edge_u) * inverse;
+        if (!(u >= 0.0 && v >= 0.0 && u + v <= 1.0)) t = put_on_edge(from, way, edge_u, edge_v, u, v);
+        const float moved = (float)(t - rays.skipped[ray]);
+        if (!(t >= -START_ROUNDING && is_nearer(rays, ray, moved, place))) return false;
+        keep(rays, ray, moved, place, false);
+        rays.u[ray] = (float)u;
+        rays.v[ray] = (float)v;
+        return true;
+    }
+
+    // A ray that passes a triangle by less than rounding meets it where it comes nearest to the edge that it passes: where
+    // it crosses the plane may be far away if it grazes that. The new t.
+    OUT_OF_LINE double put_on_edge(
+        const double* from, const double* way, const double* edge_u, const double* edge_v, double& u, double& v
+    ) {
+        double begin[3], edge[3];  // from the first corner
+        const double w = 1.0 - u - v;
+        const bool is_along_v = u <= v && u <= w, is_along_u = !is_along_v && v <= w;
+        for (int k = 0; k < 3; ++k) {
+            begin[k] = (is_along_u || is_along_v ? 0.0 : edge_u[k]) - from[k];
+            edge[k] = is_along_v ? edge_v[k] : is_along_u ? edge_u[k] : edge_v[k] - edge_u[k];
+        }
+        const double way_way = dot(way, way), way_edge = dot(way, edge);
+        const double square = dot(edge, edge) * way_way - way_edge * way_edge;
+        double s = 0.0;
+        if (square > 0.0) s = within((dot(begin, way) * way_edge - dot(begin, edge) * way_way) / square, 1.0);
+        u = is_along_v ? 0.0 : is_along_u ? s : 1.0 - s;
+        v = is_along_u ? 0.0 : s;
+        return (dot(begin, way) + s * way_edge) / way_way;
     }
 
     // A patch is met where the ray crosses its plane over its texel.
@@ -221,7 +280,15 @@ struct TreeWalk : Vectors {
         const EightFlags is_met = (beside <= eight(half_patch)) & (t >= eight(0.0f)) & (t <= eight(rays.nearest[ray]))
             & (slope * slope > eight(EDGE_ON * EDGE_ON));
         ++rays.steps[ray];
-        return keep_nearest(rays, ray, t, bits(is_met), row, true);
+        int lanes = bits(is_met);
+        if (!lanes) return false;
+        float of_lane[LANES];
+        store(of_lane, t);
+        for (; lanes; lanes &= lanes - 1) {
+            const int lane = lowest_bit(lanes), place = LANES * row + lane;
+            if (is_nearer(rays, ray, of_lane[lane], place)) keep(rays, ray, of_lane[lane], place, true);
+        }
+        return true;
     }
 
     SHARED bool meet(const Tree& tree, int child, Rays& rays, int ray) {

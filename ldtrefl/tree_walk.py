@@ -31,6 +31,12 @@ NEGLIGIBLE = 1.0e-18
 EDGE_ON = 2.0e-7
 """|n . direction| up to which a patch is seen edge on, to float32's rounding."""
 
+DEPTH_SLACK = 1.0e-6
+"""Unit space: rounding of how far along a ray a corner lies, with some to spare."""
+
+START_ROUNDING = 1.2e-7
+"""Unit space: how far behind its start a ray still meets what it starts on, for the rounding of a float32 start."""
+
 PACKET_SPREAD = 0.25
 """Unit space: how far the starts, and the directions, of the rays of a packet may lie apart along an axis."""
 
@@ -61,7 +67,15 @@ def _native(body: str) -> str:
     """The C++ of ``tree_walk.h`` after the constants that it names, what all calls need, and a call."""
     folder = Path(__file__).parent
     lengths = {"BOX_SLACK": BOX_SLACK, "EDGE_ON": EDGE_ON, "NEGLIGIBLE": NEGLIGIBLE, "PACKET_SPREAD": PACKET_SPREAD}
-    lengths |= {"NEAR": NEAR, "GRAZING": GRAZING, "FAR": FAR, "T_ROUNDING": T_ROUNDING, "LARGE_PATCH": LARGE_PATCH}
+    lengths |= {
+        "NEAR": NEAR,
+        "DEPTH_SLACK": DEPTH_SLACK,
+        "START_ROUNDING": START_ROUNDING,
+        "GRAZING": GRAZING,
+        "FAR": FAR,
+        "T_ROUNDING": T_ROUNDING,
+        "LARGE_PATCH": LARGE_PATCH,
+    }
     numbers = {"MOST_DOUBTS": MOST_DOUBTS, "TREE_NODE": NODE, "TREE_STACK": STACK, "RAY_BLOCK": RAY_BLOCK}
     lines = [f"constexpr float {name} = {float(value)!r}f;" for name, value in lengths.items()]
     lines += [f"constexpr int {name} = {int(value)};" for name, value in numbers.items()]
@@ -88,7 +102,7 @@ SEARCH = """
         hit.triangle = -1;
         hit.t = INFINITY;
         if (own.met[lane] < 0) continue;
-        TreeAnswer::Answer answer = TreeAnswer::to(tree, own, lane, asked[i]);
+        TreeAnswer::Answer answer = TreeAnswer::to(tree, own, lane);
         if (view.front != 0.0f && TreeAnswer::is_doubted(answer, asked[i].direction, view.front))
             hit.steps += TreeAnswer::go_beyond(tree, asked[i], view.front, view.horizon, answer);
         hit.triangle = answer.triangle;

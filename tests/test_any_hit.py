@@ -14,11 +14,6 @@ from stress_cases.judge import brute_force, rays_about
 import ldtrefl
 from ldtrefl import shapes
 
-pytestmark = pytest.mark.skipif(
-    not all(hasattr(kind, "occluded") for kind in (ldtrefl.LayeredDepthTexture, ldtrefl.Raycaster)),
-    reason="LayeredDepthTexture and Raycaster have no occluded yet",
-)
-
 MESHES = {
     "box": ("box", {}),
     "knot": ("torus_knot", {"segments": [96, 16]}),

@@ -16,10 +16,7 @@ import ldtrefl
 RAYS = 1000
 """Of each of seven kinds at each mesh: some 50,000 in all."""
 
-WIDENED = pytest.mark.xfail(
-    strict=True, reason="records are widened by EDGE_SLACK, and so are met by what passes beside"
-)
-TRACERS = [pytest.param("exact", marks=WIDENED), "bvh"]
+TRACERS = ["exact", "bvh"]
 SMALL = [name for name in edges.made() if "rod" not in name]
 ROD = "rod of triangles 10,000 : 1"
 

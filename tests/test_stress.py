@@ -21,14 +21,7 @@ FORKING = ("files", "kills", "cache_files")
 IN_THIS_PROCESS = [name for name in CASES if name not in FORKING]
 
 
-WIDENED = pytest.mark.xfail(
-    strict=True, reason="records are widened by EDGE_SLACK, and so are met by what passes beside"
-)
-
-
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=WIDENED) if name == "edges" else name for name in IN_THIS_PROCESS]
-)
+@pytest.mark.parametrize("name", IN_THIS_PROCESS)
 def test_case_keeps_its_limits(name: str) -> None:
     size = CASES[name][1]
     outcomes = load(name).run(size.rays, size.pictures)

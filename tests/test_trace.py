@@ -78,10 +78,10 @@ def test_direction_length_scales_t() -> None:
     origins, directions = rays_about(shapes.make("torus"), 2000)
     for tracer in all_tracers(shapes.make("torus")):
         unit = tracer.trace(origins, directions)
-        for length in (1e-20, 1e-3, 7.0, 1e18):
+        for length in (2.0**-66, 2.0**-10, 4.0, 2.0**60):  # which round no direction
             scaled = tracer.trace(origins, directions * np.float32(length))
             np.testing.assert_array_equal(scaled.triangle, unit.triangle)
-            np.testing.assert_allclose(scaled.t, unit.t / np.float32(length), rtol=1e-5)
+            np.testing.assert_array_equal(scaled.t, unit.t / np.float32(length))
 
 
 def test_rays_that_are_none_miss_and_are_counted() -> None:
@@ -154,9 +154,9 @@ def test_barycentrics_and_normal_are_the_hit_triangles() -> None:
 
 def test_wrong_arrays_are_refused() -> None:
     for tracer in all_tracers(shapes.make("box")):
-        with pytest.raises(ldtrefl.InputError, match=r"origins must have shape \(n, 3\)"):
+        with pytest.raises(ldtrefl.InputError, match=r"origins must have shape \(\.\.\., 3\)"):
             tracer.trace(np.zeros((3, 2)), np.zeros((3, 2)))
-        with pytest.raises(ldtrefl.InputError, match="2 origins for 3 directions"):
+        with pytest.raises(ldtrefl.InputError, match=r"origins of shape \(2, 3\) for directions of shape \(3, 3\)"):
             tracer.trace(np.zeros((2, 3)), np.zeros((3, 3)))
     with pytest.raises(ldtrefl.InputError, match="unknown search 'linea'; did you mean 'linear'"):
         all_tracers(shapes.make("box"))[1].trace(np.zeros((1, 3)), np.zeros((1, 3)), search="linea")

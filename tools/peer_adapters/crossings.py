@@ -70,10 +70,8 @@ class Target:
 
     def occluded(self, origins: np.ndarray, directions: np.ndarray, t_max: float) -> np.ndarray:
         """(n,) bool: whether something is met before ``t_max``."""
-        if hasattr(self.tracer, "occluded"):
-            some = (origins - self.middle).astype(np.float32), directions.astype(np.float32)
-            return np.asarray(self.tracer.occluded(*some, t_max=t_max))
-        return self.first(origins, directions).t < t_max
+        some = (origins - self.middle).astype(np.float32), directions.astype(np.float32)
+        return np.asarray(self.tracer.occluded(*some, t_max=t_max))
 
     def on_plane(self, triangle: np.ndarray, points: np.ndarray) -> np.ndarray:
         """(n, 3) points moved into the planes of their triangles, as float32 distances leave them a little off."""
