@@ -23,7 +23,7 @@ from ldtrefl.fragments import LdtView, texel_number, triangle_of
 from ldtrefl.hit import Hit, no_hit
 from ldtrefl.shade import barycentrics_at
 from ldtrefl.trace import Query, Tracer, any_one_by_one, one_by_one
-from ldtrefl.unit_rays import distance_passed
+from ldtrefl.unit_rays import NEAR, distance_passed
 from ldtrefl.vectors import as_double, as_single, point_along
 
 BOX_MARGIN = wp.constant(0.01)
@@ -179,7 +179,9 @@ def march_linear(view: LdtView, origin: wp.vec3, direction: wp.vec3, t_max: floa
 @wp.func
 def closest_hit_linear(views: wp.array(dtype=LdtView), index: int, query: Query) -> Hit:
     """The tracer's closest hit of a ray, by :func:`march_linear`."""
-    passed = distance_passed(query.origin, query.direction)
+    passed = float(0.0)
+    if wp.max(wp.abs(query.origin)) > NEAR:
+        passed = distance_passed(query.origin, query.direction, NEAR)
     origin, direction = as_single(point_along(query.origin, query.direction, passed)), query.direction
     t_max = query.t_max - passed
     scale = views[index].texels_per_unit

@@ -25,7 +25,7 @@ from ldtrefl.trace import (
     one_by_one,
     trace_batch,
 )
-from ldtrefl.unit_rays import distance_passed
+from ldtrefl.unit_rays import SPHERE, distance_passed
 from ldtrefl.vectors import as_single, point_along
 
 
@@ -42,7 +42,7 @@ def closest_hit_bvh(views: wp.array(dtype=BvhView), index: int, query: Query) ->
     """The tracer's closest hit of a ray."""
     hit = no_hit()
     if query.t_max > 0.0:
-        passed = distance_passed(query.origin, query.direction)
+        passed = distance_passed(query.origin, query.direction, SPHERE)
         origin = as_single(point_along(query.origin, query.direction, passed))
         found = wp.mesh_query_ray(views[index].mesh, origin, query.direction, query.t_max - passed)
         if found.result:
@@ -60,7 +60,7 @@ def occluded_bvh(views: wp.array(dtype=BvhView), index: int, query: Query, outwa
     """The tracer's ``occluded``; a ray that leaves the mesh starts above its own triangle."""
     if not query.t_max > 0.0:
         return False
-    passed = distance_passed(query.origin, query.direction)
+    passed = distance_passed(query.origin, query.direction, SPHERE)
     origin = as_single(point_along(query.origin, query.direction, passed))
     return wp.mesh_query_ray_anyhit(views[index].mesh, origin, query.direction, query.t_max - passed)
 

@@ -10,7 +10,6 @@ thousand cells. The lower levels of each group of cells are then built beside th
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,6 +20,7 @@ from ldtrefl.binning import bin_items
 from ldtrefl.budget import memory_limit
 from ldtrefl.device_scene import DeviceMesh
 from ldtrefl.errors import InputError
+from ldtrefl.native_sources import native_body
 from ldtrefl.pieces import LARGE, Piece, high_corner, low_corner
 from ldtrefl.tree import (
     BOX_MARGIN,
@@ -184,11 +184,9 @@ def measure_cells(
     reference_out[i] = made
 
 
-def _native(body: str) -> str:
-    """C++ of ``tree_build.h`` and a call of it."""
-    folder = Path(__file__).parent
-    constants = f"constexpr float EMPTY = {EMPTY!r}f, SHORTEST = {SHORTEST!r}f; constexpr int TREE_STACK = {STACK};"
-    return "\n".join([constants, *((folder / name).read_text() for name in ("vectors.h", "tree_build.h")), body])
+CONSTANTS = {"EMPTY": EMPTY, "SHORTEST": SHORTEST, "TREE_STACK": STACK}
+FILES = ("vectors.h", "tree_build.h")
+"""What native functions here are made of."""
 
 
 SPLIT = """
@@ -199,7 +197,7 @@ SPLIT = """
 """
 
 
-@wp.func_native(_native(SPLIT))
+@wp.func_native(native_body(CONSTANTS, FILES, SPLIT))
 def split_all(
     references: wp.array(dtype=Reference),
     begin: int,
@@ -327,7 +325,7 @@ GATHER = """
 """
 
 
-@wp.func_native(_native(GATHER))
+@wp.func_native(native_body(CONSTANTS, FILES, GATHER))
 def gather_all(
     nodes: wp.array(dtype=Node),
     item: wp.array(dtype=wp.int32),

@@ -8,11 +8,10 @@ horizon, where the next patch sticks out by its margin, or it started inside.
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import warp as wp
 
 from ldtrefl.hit import Hit
+from ldtrefl.native_sources import native_body
 from ldtrefl.shade import barycentrics_at
 from ldtrefl.strays import first_stray
 from ldtrefl.trace import RAY_BLOCK, Query, Tracer
@@ -63,24 +62,25 @@ OWN_STEP = wp.constant(1.0 / 16.0)
 """Sides of a patch by which a search goes on behind such a patch."""
 
 
-def _native(body: str) -> str:
-    """The C++ of ``tree_walk.h`` after the constants that it names, what all calls need, and a call."""
-    folder = Path(__file__).parent
-    lengths = {"BOX_SLACK": BOX_SLACK, "EDGE_ON": EDGE_ON, "NEGLIGIBLE": NEGLIGIBLE, "PACKET_SPREAD": PACKET_SPREAD}
-    lengths |= {
-        "NEAR": NEAR,
-        "DEPTH_SLACK": DEPTH_SLACK,
-        "START_ROUNDING": START_ROUNDING,
-        "GRAZING": GRAZING,
-        "FAR": FAR,
-        "T_ROUNDING": T_ROUNDING,
-        "LARGE_PATCH": LARGE_PATCH,
-    }
-    numbers = {"MOST_DOUBTS": MOST_DOUBTS, "TREE_NODE": NODE, "TREE_STACK": STACK, "RAY_BLOCK": RAY_BLOCK}
-    lines = [f"constexpr float {name} = {float(value)!r}f;" for name, value in lengths.items()]
-    lines += [f"constexpr int {name} = {int(value)};" for name, value in numbers.items()]
-    files = [(folder / name).read_text() for name in ("vectors.h", "tree_walk.h", "tree_answer.h")]
-    return "\n".join([*lines, *files, body])
+CONSTANTS: dict[str, float | int] = {
+    "BOX_SLACK": BOX_SLACK,
+    "DEPTH_SLACK": DEPTH_SLACK,
+    "EDGE_ON": EDGE_ON,
+    "FAR": FAR,
+    "GRAZING": GRAZING,
+    "LARGE_PATCH": float(LARGE_PATCH),
+    "MOST_DOUBTS": MOST_DOUBTS,
+    "NEAR": NEAR,
+    "NEGLIGIBLE": NEGLIGIBLE,
+    "PACKET_SPREAD": PACKET_SPREAD,
+    "RAY_BLOCK": RAY_BLOCK,
+    "START_ROUNDING": START_ROUNDING,
+    "TREE_NODE": NODE,
+    "TREE_STACK": STACK,
+    "T_ROUNDING": T_ROUNDING,
+}
+FILES = ("vectors.h", "tree_walk.h", "tree_answer.h")
+"""What native functions here are made of."""
 
 
 TREE = """
@@ -124,7 +124,7 @@ SEARCH_FOR_ANY = """
 """
 
 
-@wp.func_native(_native(TREE + SEARCH))
+@wp.func_native(native_body(CONSTANTS, FILES, TREE + SEARCH))
 def search_tree(
     views: wp.array(dtype=TreeView),
     index: int,
@@ -136,7 +136,7 @@ def search_tree(
     ...
 
 
-@wp.func_native(_native(TREE + SEARCH_FOR_ANY))
+@wp.func_native(native_body(CONSTANTS, FILES, TREE + SEARCH_FOR_ANY))
 def search_tree_for_any(
     views: wp.array(dtype=TreeView),
     index: int,

@@ -11,6 +11,9 @@ import warp as wp
 from ldtrefl.device_scene import ObjectRecord
 from ldtrefl.vectors import as_double, as_single
 
+NEAR = wp.constant(wp.float64(8.0))
+"""Unit space: coordinates up to which float32 does for where a ray starts."""
+
 SPHERE = wp.constant(wp.float64(1.75))
 """Radius of a sphere about the unit cube."""
 
@@ -42,12 +45,12 @@ def into_unit(record: ObjectRecord, origin: wp.vec3d, direction: wp.vec3) -> Uni
 
 
 @wp.func
-def distance_passed(origin: wp.vec3d, direction: wp.vec3) -> float:
-    """How far, in lengths of ``direction``, a ray may go before it comes to the unit cube: in float64, which rounds
-    its start the less the nearer it has come."""
+def distance_passed(origin: wp.vec3d, direction: wp.vec3, radius: wp.float64) -> float:
+    """How far, in lengths of ``direction``, a ray may go before it comes to a sphere about the unit cube: in float64,
+    which rounds its start the less the nearer it has come."""
     way = as_double(direction)
     square = wp.dot(way, way)
-    along = -wp.dot(origin, way) - SPHERE * wp.sqrt(square)
+    along = -wp.dot(origin, way) - radius * wp.sqrt(square)
     return float(wp.max(along, wp.float64(0.0)) / square)
 
 

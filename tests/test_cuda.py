@@ -23,7 +23,7 @@ from ldtrefl.trace import batch_kernel
 def all_kernels() -> list[wp.Kernel]:
     for tracer in (BVH, *TRACERS.values()):
         batch_kernel(tracer, 1)
-        batch_kernel(tracer, 1, only_whether=True)
+        batch_kernel(tracer, 1, True)
         closest_hits_kernel(tracer, 1)
     for tracer in (NOTHING, BVH, *TRACERS.values()):
         shade_hits_kernel(tracer)

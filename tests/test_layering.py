@@ -20,6 +20,7 @@ BOTTOM_TO_TOP = (
     "fingerprint",
     "npz",
     "native",
+    "native_sources",
     "skips",
     "cache",
     "warp_abi",

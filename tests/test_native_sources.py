@@ -1,0 +1,87 @@
+"""The C++ of native functions: it compiles alone, with vectors and without, answers the same, leaves no macro behind."""
+
+import dataclasses
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+import warp as wp
+from stress_cases.judge import rays_about
+
+import ldtrefl
+from ldtrefl import native_sources, shapes, tree_build, tree_walk
+from ldtrefl.hit import Hit
+from ldtrefl.trace import Query, array_of_views, trace_batch
+from ldtrefl.tree import TreeView
+from ldtrefl.tree_walk import CONSTANTS, FILES, SEARCH, TREE
+
+SHIM = """
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#define CUDA_CALLABLE
+"""
+"""What Warp's headers give native functions."""
+
+SOURCES = {
+    "vectors.h": (tree_build.CONSTANTS, ()),
+    "tree_build.h": (tree_build.CONSTANTS, ("vectors.h",)),
+    "tree_walk.h": (tree_walk.CONSTANTS, ("vectors.h",)),
+    "tree_answer.h": (tree_walk.CONSTANTS, ("vectors.h", "tree_walk.h")),
+}
+
+
+def test_every_file_is_here() -> None:
+    assert {path.name for path in native_sources.FOLDER.glob("*.h")} == set(SOURCES)
+
+
+@pytest.mark.skipif(shutil.which("g++") is None, reason="no g++ on this machine")
+@pytest.mark.parametrize("plain", [False, True])
+@pytest.mark.parametrize("name", SOURCES)
+def test_a_file_compiles_after_what_it_is_derived_from(name: str, plain: bool, tmp_path: Path) -> None:
+    """In a function, as it will stand; ``plain`` is what compilers without vectors see."""
+    constants, before = SOURCES[name]
+    body = native_sources.native_body(constants, (*before, name), "")
+    program = SHIM + "#define PLAIN_VECTORS\n" * plain + "void function() {\n" + body + "\n}\n"
+    (tmp_path / "program.cpp").write_text(program)
+    command = ["g++", "-std=c++17", "-fsyntax-only", "-Wall", "-Wextra", "-Werror", "-Wno-unused", "-Wno-psabi"]
+    command += ["-Wno-unknown-pragmas", str(tmp_path / "program.cpp")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_macros_end_with_the_body() -> None:
+    body = native_sources.native_body(tree_walk.CONSTANTS, tree_walk.FILES, "")
+    defined, undefined = (re.findall(rf"^ *#{word} (\w+)", body, re.MULTILINE) for word in ("define", "undef"))
+    assert set(defined) == set(undefined) and {"SHARED", "FUSED"} <= set(defined)
+
+
+@wp.func_native("\n#define PLAIN_VECTORS\n" + native_sources.native_body(CONSTANTS, FILES, TREE + SEARCH))
+def search_without_vectors(
+    views: wp.array(dtype=TreeView), index: int, queries: wp.array(dtype=Query), count: int, hits: wp.array(dtype=Hit)
+): ...
+
+
+@wp.func
+def closest_hits_without_vectors(
+    views: wp.array(dtype=TreeView), index: int, queries: wp.array(dtype=Query), count: int, hits: wp.array(dtype=Hit)
+):
+    search_without_vectors(views, index, queries, count, hits)
+
+
+def test_without_vectors_the_answers_are_the_same() -> None:
+    """What CUDA runs, on this processor."""
+    mesh = shapes.make("genus3", {"grid": 32})
+    maps = ldtrefl.peel(mesh.vertices, mesh.faces)
+    origins, directions = rays_about(mesh, 20_000)
+    expected = maps.trace(origins, directions)
+    plain = dataclasses.replace(tree_walk.EXACT, name="plain", closest_hits=closest_hits_without_vectors)
+    views = array_of_views([maps.tree.view], TreeView, maps.geometry.vertices.device)
+    found = trace_batch(plain, views, maps.geometry, origins, directions)
+    assert (found.triangle >= 0).mean() > 0.3
+    np.testing.assert_array_equal(found.triangle, expected.triangle)
+    np.testing.assert_array_equal(found.t, expected.t)
