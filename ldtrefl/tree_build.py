@@ -10,6 +10,7 @@ thousand cells. The lower levels of each group of cells are then built beside th
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -81,11 +82,12 @@ class Node:
 
 @wp.struct
 class Cells:
-    """The grid that items are sorted into."""
+    """The grid that items are sorted into, by their middles; those larger than a cell into one of cells twice as wide,
+    and so on, so that items of a cell are of a size."""
 
     low: wp.vec3
     per_unit: float
-    size: wp.vec3i
+    size: wp.vec3i  # of the finest
 
 
 @wp.func
@@ -140,10 +142,27 @@ def number_cells(
 ):
     i = first + wp.tid()
     box = reference_to(items, item_number(items, i))
-    x = cell_along(cells.per_unit * (0.5 * (box.low[0] + box.high[0]) - cells.low[0]), cells.size[0])
-    y = cell_along(cells.per_unit * (0.5 * (box.low[1] + box.high[1]) - cells.low[1]), cells.size[1])
-    z = cell_along(cells.per_unit * (0.5 * (box.low[2] + box.high[2]) - cells.low[2]), cells.size[2])
-    cell_out[i] = (z * cells.size[1] + y) * cells.size[0] + x
+    per_unit, size = float(cells.per_unit), wp.vec3i(cells.size)
+    extent = per_unit * wp.max(box.high[0] - box.low[0], wp.max(box.high[1] - box.low[1], box.high[2] - box.low[2]))
+    before = int(0)  # cells of finer grids
+    while extent > 1.0 and wp.max(size) > 1:
+        before += size[0] * size[1] * size[2]
+        size = wp.vec3i((size[0] + 1) / 2, (size[1] + 1) / 2, (size[2] + 1) / 2)
+        per_unit *= 0.5
+        extent *= 0.5
+    x = cell_along(per_unit * (0.5 * (box.low[0] + box.high[0]) - cells.low[0]), size[0])
+    y = cell_along(per_unit * (0.5 * (box.low[1] + box.high[1]) - cells.low[1]), size[1])
+    z = cell_along(per_unit * (0.5 * (box.low[2] + box.high[2]) - cells.low[2]), size[2])
+    cell_out[i] = before + (z * size[1] + y) * size[0] + x
+
+
+def cell_count(size: Sequence[int]) -> int:
+    """Cells of the finest grid, which has so many along each axis, and of all coarser ones."""
+    total = math.prod(size)
+    while max(size) > 1:
+        size = [(n + 1) // 2 for n in size]
+        total += math.prod(size)
+    return total
 
 
 @launch.kernel
@@ -449,7 +468,7 @@ def _binary_tree(
     cells = _cells_about(box, count)
     cell = wp.empty(count, dtype=wp.int32, device=device)
     launch.launch(number_cells, count, [items, cells, cell], device)
-    start, ranks = bin_items(cell, math.prod(cells.size), device)
+    start, ranks = bin_items(cell, cell_count(cells.size), device)
     item = wp.empty_like(cell)
     launch.launch(put_in_order, count, [items, cell, start, ranks, item], device)
     del cell, ranks
