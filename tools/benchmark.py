@@ -1,62 +1,122 @@
-"""Run time against error: layered depth textures, Warp's BVH and Embree on the same rays and the same scenes.
+"""Run time against error: layered depth textures, Warp's BVH and other people's ray tracers on the same rays.
 
 Everything is timed in turn in one process (A B A B ...), with compilation and a first round outside the clock; figures
-are medians, with the fastest and slowest beside them in the JSON. Threads are stated with every figure.
+are medians, with the fastest and slowest beside them in the JSON. Threads are stated with every figure: with one, the
+whole process is kept to one core.
 
-    python tools/benchmark.py            # 10 minutes; writes tools/results/benchmark.json, .md and plots
+    python tools/benchmark.py            # 25 minutes; writes tools/results/benchmark.json, .md and plots
     python tools/benchmark.py --quick    # one minute, small meshes, for the shape of the output
+    python tools/benchmark.py --only rays,build --meshes "lucy.ply,knot 96 k" --kinds "primary,shadow"
+                                         # a part of it: tables on the screen, files only where -o says
 
-Real meshes are taken from LDTREFL_MESH_PATH where they are. The rays are those of a 768 x 512 camera, reflected off a
-sphere beside the object; the truth is the BVH where Embree, in robust mode, agrees with it.
+Parts: rays, build, memory, frames (error against time, stages, error targets), threads, paper. Real meshes are taken
+from LDTREFL_MESH_PATH where they are; kinds of rays are described in ``benchmark_parts/rays.py``, names of meshes in
+``models.py``, rivals in ``rivals.py``, and what is right in ``truth.py``.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-import os
-import platform
 import sys
 from pathlib import Path
+from typing import Any
 
 import warp as wp
-from benchmark_parts.common import KNOTS, REAL, ROOT, SCAN
+from benchmark_parts import cores
+from benchmark_parts.building import builds_of_meshes
+from benchmark_parts.common import ROOT
 from benchmark_parts.frames import error_against_time, error_targets, frame_stages
-from benchmark_parts.meshes import rays_on_meshes
+from benchmark_parts.models import every_name
 from benchmark_parts.paper import paper_tables
+from benchmark_parts.rays import RAYS
 from benchmark_parts.report import draw_plots, reading
+from benchmark_parts.rivals import RIVALS, available
 from benchmark_parts.threads import thread_scaling
+from benchmark_parts.tracing import rays_on_meshes
 
 import ldtrefl
 from ldtrefl.errors import InputError
 from ldtrefl.files import written_whole
 
+PARTS = ("rays", "build", "memory", "frames", "threads", "paper")
+QUICK_MESHES = ("knot 1 k", "knot 10 k", "knot 10 k outlier 1e3")
+QUICK_RAYS = 8000
+
 
 def main() -> None:
-    """Run all parts and write JSON, Markdown and plots."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="small meshes, few rounds")
-    parser.add_argument("-o", "--output", type=Path, default=ROOT / "tools" / "results", help="folder to write to")
-    arguments = parser.parse_args()
+    """Run the parts that are wanted and write JSON, Markdown and plots."""
+    arguments = _arguments()
+    result = measured(arguments)
+    report = reading(result)
+    if arguments.output is None:
+        print(report)
+        return
     arguments.output.mkdir(parents=True, exist_ok=True)
-    quick, rounds = arguments.quick, 2 if arguments.quick else 9
-    names = ["knot 1 k", "knot 10 k"] if quick else [*KNOTS, *REAL, SCAN]
-    result = {
-        "machine": f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores, Warp {wp.__version__}",
-        "quick": quick,
-        "meshes": rays_on_meshes(names, *((192, 128) if quick else (768, 512)), rounds),
-        "error_against_time": error_against_time(quick, rounds),
-        "stages": frame_stages(quick, rounds),
-        "error_targets": error_targets(quick, rounds),
-        "scaling": thread_scaling(quick, rounds),
-        "paper": paper_tables(quick, rounds),
-    }
-    ldtrefl.set_threads()
-    for name, text in (("benchmark.json", json.dumps(result, indent=1)), ("benchmark.md", reading(result))):
+    for name, text in (("benchmark.json", json.dumps(result, indent=1)), ("benchmark.md", report)):
         with written_whole(arguments.output / name) as scratch:
             scratch.write_text(text)
     draw_plots(result, arguments.output)
     print(f"written to {arguments.output}")
+
+
+def _arguments() -> argparse.Namespace:
+    def names(text: str) -> list[str]:
+        return [name.strip() for name in text.split(",") if name.strip()]
+
+    def kinds(text: str) -> list[str]:
+        return [name.strip() for name in text.split(";") if name.strip()]
+
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="small meshes, few rays and rounds")
+    parser.add_argument("--only", type=names, default=list(PARTS), help=f"parts, of {', '.join(PARTS)}")
+    parser.add_argument("--meshes", type=names, default=[], help="of rays and build, by name, with commas between")
+    parser.add_argument("--kinds", type=kinds, default=[], help="of rays, with semicolons between")
+    parser.add_argument("--rivals", type=names, default=[r.name for r in RIVALS], help="which, or 'none'")
+    parser.add_argument("--rounds", type=int, help="that count, of each timing")
+    parser.add_argument("--rays", type=int, help="of each kind, about")
+    parser.add_argument("-o", "--output", type=Path, help="folder to write to; default of a full run: tools/results")
+    arguments = parser.parse_args()
+    for part in arguments.only:
+        if part not in PARTS:
+            parser.error(f"unknown part {part!r}, allowed are {', '.join(PARTS)}")
+    is_whole = list(arguments.only) == list(PARTS) and not arguments.meshes and not arguments.kinds
+    if arguments.output is None and is_whole:
+        arguments.output = ROOT / "tools" / "results"
+    return arguments
+
+
+def measured(arguments: argparse.Namespace) -> dict[str, Any]:
+    """The figures of the parts that are wanted."""
+    quick, wanted = arguments.quick, arguments.only
+    rivals, notes = available(arguments.rivals)
+    names = arguments.meshes or (list(QUICK_MESHES) if quick else every_name())
+    rounds = arguments.rounds or (2 if quick else 5)
+    frame_rounds = arguments.rounds or (2 if quick else 9)
+    rays = arguments.rays or (QUICK_RAYS if quick else RAYS)
+    result: dict[str, Any] = {
+        "machine": f"{cores.processor()}, Warp {wp.__version__}",
+        "threads": sorted({1, len(cores.ALL)}),
+        "rivals": [rival.name for rival in rivals],
+        "notes": notes,
+        "quick": quick,
+    }
+    for note in notes:
+        print(note, file=sys.stderr)
+    if "rays" in wanted:
+        result["rays"] = rays_on_meshes(names, rivals, rounds, rays, arguments.kinds)
+    if "build" in wanted:
+        result["build"] = builds_of_meshes(names, rivals, rounds)
+    if "frames" in wanted:
+        result["error_against_time"] = error_against_time(quick, frame_rounds)
+        result["stages"] = frame_stages(quick, frame_rounds)
+        result["error_targets"] = error_targets(quick, frame_rounds)
+    if "threads" in wanted:
+        result["scaling"] = thread_scaling(quick, frame_rounds)
+    if "paper" in wanted:
+        result["paper"] = paper_tables(quick, frame_rounds)
+    ldtrefl.set_threads()
+    return result
 
 
 if __name__ == "__main__":

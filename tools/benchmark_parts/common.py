@@ -1,45 +1,14 @@
-"""The meshes, scenes and rays that the benchmark's parts share."""
+"""The scenes and kernels that the benchmark's parts share."""
 
-from __future__ import annotations
-
-import os
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import trimesh
 import warp as wp
 
-import ldtrefl
-from ldtrefl import launch, shapes, skips
+from ldtrefl import launch, skips
 from ldtrefl.scene import Camera, Light, Material, Object, Scene
-from ldtrefl.trace import Tracer, array_of_views, batch_kernel
-
-KNOTS = {
-    "knot 1 k": (64, 8),
-    "knot 10 k": (200, 25),
-    "knot 96 k": (600, 80),
-    "knot 500 k": (2000, 125),
-    "knot 2 M": (5000, 200),
-}
-
-REAL = (
-    "happy_buddha.ply",
-    "lucy.ply",
-    "bunny_open.ply",
-    "armadillo.ply",
-    "cycloidal_drive.ply",
-    "sheen_chair.glb",
-    "boot.ply",
-    "dish_with_olives.glb",
-    "teapot.ply",
-    "mosquito_in_amber.ply",
-    "spot.glb",
-)
-
-SCAN = "lucy.ply, finer"
-"""A stand-in for a dense scan: lucy with every triangle in sixteen on Loop's limit surface, roughened by a third of an
-edge."""
+from ldtrefl.trace import Tracer, array_of_views, batch_kernel, occluded_of
 
 ROOT = Path(__file__).parent.parent.parent
 
@@ -47,65 +16,80 @@ SKIPS_BUT_FRAMES = [name for name in skips.names() if name != "frames"]
 """So that every frame is made anew."""
 
 
-def mirror_rays(width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
-    """(n, 3) float32 origins and directions in the unit space of an object beside a mirror ball."""
-    eye, scale, place = np.array([0, -4.0, 0.6]), 1.3, np.array([0.6, -1.9, 0.5])
-    forward = -eye / np.linalg.norm(eye)
-    right = np.cross(forward, [0, 0, 1])
-    right /= np.linalg.norm(right)
-    down = np.cross(forward, right)
-    half = np.tan(np.radians(20.0))
-    x, y = np.meshgrid((np.arange(width) + 0.5) / width * 2 - 1, (np.arange(height) + 0.5) / height * 2 - 1)
-    rays = forward + (x * half * width / height)[..., None] * right + (y * half)[..., None] * down
-    rays = (rays / np.linalg.norm(rays, axis=-1, keepdims=True)).reshape(-1, 3)
-    b = rays @ eye
-    square = b * b - eye @ eye + 1.0
-    rays, b, square = rays[square > 0], b[square > 0], square[square > 0]
-    points = eye + (-b - np.sqrt(square))[:, None] * rays
-    directions = rays - 2 * (rays * points).sum(axis=1, keepdims=True) * points
-    return ((points - place) / scale).astype(np.float32), directions.astype(np.float32)
+UNIT_SPACE = np.zeros(3), 1.0
+"""The ``unit_frame`` of rays that are in unit space already."""
 
 
 class Batch:
     """A tracer's kernel over fixed rays, its outputs allocated once."""
 
-    def __init__(self, tracer: Tracer, view: Any, origins: wp.array, directions: wp.array) -> None:
+    def __init__(
+        self,
+        tracer: Tracer,
+        view: Any,
+        origins: wp.array,
+        directions: wp.array,
+        unit_frame: tuple[np.ndarray, float] = UNIT_SPACE,
+    ) -> None:
         n, device = origins.shape[0], origins.device
         self.t, self.triangle = wp.empty(n, dtype=float, device=device), wp.empty(n, dtype=int, device=device)
         outputs = [self.t, wp.empty(n, dtype=wp.vec3, device=device), self.triangle]
         outputs += [wp.empty(n, dtype=wp.vec2, device=device), wp.zeros(n, dtype=wp.uint8, device=device)]
         self._view = view  # owns the arrays that the kernel's copy points to
         views = array_of_views([view], tracer.view, device)
-        self._arguments = [views, wp.vec3d(0.0, 0.0, 0.0), wp.float64(1.0), origins, directions, *outputs]
+        self._arguments = [views, wp.vec3d(*unit_frame[0]), wp.float64(1.0 / unit_frame[1])]
+        self._arguments += [origins, directions, *outputs]
         self._kernel, self._count, self._device = batch_kernel(tracer), n, device
 
     def __call__(self) -> None:
         launch.launch(self._kernel, self._count, self._arguments, self._device)
 
 
-def load(name: str) -> ldtrefl.Mesh | None:
-    """A knot, a shape, or a real mesh; None where it is missing."""
-    if name in KNOTS:
-        return shapes.make("torus_knot", {"segments": list(KNOTS[name])})
-    if name in shapes.names():
-        return shapes.make(name)
-    if name == SCAN:
-        coarse = load("lucy.ply")
-        return None if coarse is None else _finer(coarse)
-    for folder in filter(None, os.environ.get("LDTREFL_MESH_PATH", "").split(os.pathsep)):
-        if (Path(folder) / name).is_file():
-            return ldtrefl.load_mesh(Path(folder) / name)
-    return None
+@launch.once
+def any_hit_kernel(tracer: Tracer) -> wp.Kernel:
+    """The kernel that asks of rays, given in object space with unit directions, whether they meet anything."""
+    is_blocked = occluded_of(tracer)
+
+    @launch.kernel
+    def trace_any_hit(
+        first: int,
+        # In:
+        views: wp.array(dtype=tracer.view),
+        centre: wp.vec3d,
+        per_half: wp.float64,
+        origins: wp.array(dtype=wp.vec3),
+        directions: wp.array(dtype=wp.vec3),
+        # Out:
+        occluded_out: wp.array(dtype=wp.bool),
+    ):
+        i = first + wp.tid()
+        o = origins[i]
+        start = per_half * (wp.vec3d(wp.float64(o[0]), wp.float64(o[1]), wp.float64(o[2])) - centre)
+        occluded_out[i] = is_blocked(views, 0, start, directions[i], float(wp.inf), wp.vec3(0.0))
+
+    return trace_any_hit
 
 
-def _finer(mesh: ldtrefl.Mesh) -> ldtrefl.Mesh:
-    fine = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
-    fine.merge_vertices(merge_tex=True, merge_norm=True)
-    fine = fine.subdivide_loop(iterations=2)
-    edge = float(fine.edges_unique_length.mean())
-    return ldtrefl.Mesh(
-        fine.vertices + 0.3 * edge * np.random.default_rng(0).normal(size=fine.vertices.shape), fine.faces
-    )
+class AnyHitBatch:
+    """The same for any-hit queries."""
+
+    def __init__(
+        self,
+        tracer: Tracer,
+        view: Any,
+        origins: wp.array,
+        directions: wp.array,
+        unit_frame: tuple[np.ndarray, float] = UNIT_SPACE,
+    ) -> None:
+        self.occluded = wp.empty(origins.shape[0], dtype=wp.bool, device=origins.device)
+        self._view = view
+        views = array_of_views([view], tracer.view, origins.device)
+        self._arguments = [views, wp.vec3d(*unit_frame[0]), wp.float64(1.0 / unit_frame[1])]
+        self._arguments += [origins, directions, self.occluded]
+        self._kernel, self._count, self._device = any_hit_kernel(tracer), origins.shape[0], origins.device
+
+    def __call__(self) -> None:
+        launch.launch(self._kernel, self._count, self._arguments, self._device)
 
 
 def knot_scene(segments: tuple[int, int], width: int, height: int) -> Scene:

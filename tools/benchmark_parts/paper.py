@@ -14,7 +14,8 @@ from ldtrefl.device_scene import DeviceMesh
 from ldtrefl.ldt import peel_mesh
 from ldtrefl.render import Renderer
 
-from .common import ROOT, SKIPS_BUT_FRAMES, load
+from .common import ROOT, SKIPS_BUT_FRAMES
+from .models import load
 
 PAPER_TABLE_1 = {  # model: triangles, layers, milliseconds on an NVIDIA GeForce 7800 (Zhang, Hsieh and Shen)
     "Ball": (1520, 1, 24.783),

@@ -10,20 +10,43 @@ import numpy as np
 
 from ldtrefl.files import written_whole
 
-from .common import KNOTS
+from .models import KNOTS
+from .tables import build_tables, number, rays_tables, table
+from .tracing import OLD_KIND
 
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 
 
 def draw_plots(result: dict[str, Any], folder: Path) -> None:
-    """Error against time, and time against triangles."""
+    """Error against time, and time, build time and bytes against triangles, of the parts that were run."""
+    if "error_against_time" in result:
+        _plot_error_against_time(result["error_against_time"], folder)
+    if "rays" in result:
+        knots = {row["triangles"]: row["kinds"] for row in result["rays"] if row["mesh"] in KNOTS}
+        times = {n: kinds[OLD_KIND]["milliseconds"]["1"]["kernel"] for n, kinds in knots.items() if OLD_KIND in kinds}
+        label = "milliseconds for the rays of a frame, one thread"
+        _plot_against_triangles(_medians(times), label, folder / "time_against_triangles.png")
+    if "build" in result:
+        rows = [row for row in result["build"] if row["mesh"] in KNOTS]
+        times = {row["triangles"]: row["milliseconds"]["1"]["numpy"] for row in rows}
+        label = "milliseconds to build from numpy arrays, one thread"
+        _plot_against_triangles(_medians(times), label, folder / "build_against_triangles.png")
+        megabytes = {row["triangles"]: {n: b / 1e6 for n, b in row["bytes"].items()} for row in rows}
+        _plot_against_triangles(megabytes, "megabytes beside the mesh", folder / "bytes_against_triangles.png")
+
+
+def _medians(times: dict[int, dict[str, Any]]) -> dict[int, dict[str, float]]:
+    return {n: {name: entry["median"] for name, entry in by_tracer.items()} for n, by_tracer in times.items()}
+
+
+def _plot_error_against_time(points: list[dict[str, Any]], folder: Path) -> None:
     figure, axes = plt.subplots(figsize=(7, 5))
     curves: dict[str, list[tuple[float, float]]] = {}
-    for point in result["error_against_time"]:
+    for point in points:
         curves.setdefault(point["curve"], []).append((point["milliseconds"]["median"], point["flip"]))
-    for curve, points in curves.items():
-        times, errors = zip(*points, strict=True)
+    for curve, pairs in curves.items():
+        times, errors = zip(*pairs, strict=True)
         axes.plot(times, np.maximum(errors, 1e-7), "o-", label=curve, markersize=4)
     axes.set(xscale="log", yscale="log", xlabel="milliseconds per frame", ylabel="FLIP over the mirror (1e-7 = none)")
     axes.set_title("Error against time: mirror ball and torus knot")
@@ -31,24 +54,18 @@ def draw_plots(result: dict[str, Any], folder: Path) -> None:
     axes.legend()
     _save(figure, folder / "error_against_time.png")
 
-    knots = [row for row in result["meshes"] if row["mesh"] in KNOTS]
 
-    def figure_of(entry: Any) -> float:
-        return entry["median"] if isinstance(entry, dict) else entry / 1e6
-
-    for key, label, name in (
-        ("milliseconds", "milliseconds for the rays of a frame, one thread", "time_against_triangles.png"),
-        ("build_milliseconds", "milliseconds to build, one thread", "build_against_triangles.png"),
-        ("bytes", "megabytes beside the mesh", "bytes_against_triangles.png"),
-    ):
-        figure, axes = plt.subplots(figsize=(7, 5))
-        for tracer in knots[0][key]:
-            values = [figure_of(row[key][tracer]) for row in knots]
-            axes.plot([row["triangles"] for row in knots], values, "o-", label=tracer, markersize=4)
-        axes.set(xscale="log", yscale="log", xlabel="triangles", ylabel=label, title="Torus knot")
-        axes.grid(True, which="both", alpha=0.3)
+def _plot_against_triangles(values: dict[int, dict[str, float]], label: str, path: Path) -> None:
+    """A curve for each tracer: {triangles: {tracer: value}}."""
+    figure, axes = plt.subplots(figsize=(7, 5))
+    for tracer in dict.fromkeys(name for by_tracer in values.values() for name in by_tracer):
+        known = [(n, by_tracer[tracer]) for n, by_tracer in sorted(values.items()) if tracer in by_tracer]
+        axes.plot(*zip(*known, strict=True), "o-", label=tracer, markersize=4)
+    axes.set(xscale="log", yscale="log", xlabel="triangles", ylabel=label, title="Torus knot")
+    axes.grid(True, which="both", alpha=0.3)
+    if values:
         axes.legend()
-        _save(figure, folder / name)
+    _save(figure, path)
 
 
 def _save(figure: Any, path: Path) -> None:
@@ -59,76 +76,56 @@ def _save(figure: Any, path: Path) -> None:
 
 
 def reading(result: dict[str, Any]) -> str:
-    """The figures as Markdown tables."""
-    lines = [
-        "# Benchmark",
-        "",
-        f"{result['machine']}; medians, milliseconds.",
-        "",
-        "## Rays of a frame, one thread",
-        "",
-    ]
-    lines += ["| mesh | triangles | Warp BVH | Embree | exact | default | fast | linear | exact: wrong % | "]
-    lines[-1] += (
-        "default: wrong hits %, misses % | default: p99 texels | BVH / exact | BVH / default | Embree / default |"
-    )
-    lines += ["|" + "---|" * 14]
-    for row in result["meshes"]:
-        t = {name: entry["median"] for name, entry in row["milliseconds"].items()}
-        exact, default = row["errors"]["ldt exact"], row["errors"]["ldt balanced"]
-        wrong = exact["wrong_hits"] + exact["wrong_misses"]
-        lines.append(
-            f"| {row['mesh']} | {row['triangles']} | {t['bvh']:.1f} | {t['embree']:.1f} | {t['ldt exact']:.1f} | "
-            f"{t['ldt balanced']:.1f} | {t['ldt fast']:.1f} | {t['ldt linear']:.0f} | {wrong:.4f} | "
-            f"{default['wrong_hits']:.3f}, {default['wrong_misses']:.3f} | {default['p99']:.3f} | "
-            f"{t['bvh'] / t['ldt exact']:.2f} | {t['bvh'] / t['ldt balanced']:.2f} | "
-            f"{t['embree'] / t['ldt balanced']:.2f} |"
-        )
-    lines += ["", "## Build, one thread", "", "| mesh | Warp BVH | Embree | default | exact | linear | default MB | "]
-    lines[-1] += "BVH, Embree MB | rays to break even with BVH |"
-    lines += ["|" + "---|" * 9]
-    for row in result["meshes"]:
-        b = {name: entry["median"] for name, entry in row["build_milliseconds"].items()}
-        t = {name: entry["median"] / row["rays"] for name, entry in row["milliseconds"].items()}
-        later, gain = b["ldt balanced"] - b["bvh"], t["bvh"] - t["ldt balanced"]
-        even = "0" if later <= 0 else f"{later / gain:.0f}" if gain > 0 else "never"
-        lines.append(
-            f"| {row['mesh']} | {b['bvh']:.1f} | {b['embree']:.1f} | {b['ldt balanced']:.1f} | {b['ldt exact']:.1f} | "
-            f"{b['ldt linear']:.1f} | {row['bytes']['ldt balanced'] / 1e6:.1f} | {row['bytes']['bvh'] / 1e6:.0f}, "
-            f"{row['bytes']['embree'] / 1e6:.0f} | {even} |"
-        )
-    lines += ["", "## A frame, by stage", ""]
+    """The figures of the parts that were run, as Markdown tables."""
+    lines = ["# Benchmark", "", f"{result['machine']}; medians of things timed in turn.", ""]
+    for part, tables in (
+        ("rays", rays_tables),
+        ("build", build_tables),
+        ("stages", _frame_tables),
+        ("scaling", _scaling_line),
+        ("paper", _paper_tables),
+    ):
+        if part in result:
+            lines += tables(result)
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def _frame_tables(result: dict[str, Any]) -> list[str]:
+    lines = ["## A frame, by stage", ""]
     for name, stages in result["stages"].items():
         lines.append(f"- {name}: " + ", ".join(f"{stage} {value:.1f}" for stage, value in stages.items()))
     lines += ["", "## What `error` asks for and what comes of it", ""]
-    lines += [
-        "| scene | search | error, pixels | p50 | p99 | MB | peel, ms | march, ms |",
-        "|---|---|---|---|---|---|---|---|",
-    ]
+    body = []
     for row in result["error_targets"]:
-        figures = ("-" if row[key] is None else f"{row[key]:.3f}" for key in ("pixels_p50", "pixels_p99"))
-        lines.append(
-            f"| {row['scene']} | {row['search']} | {row['error'] or 'usual 256'} | {' | '.join(figures)} | "
-            f"{row['bytes'] / 1e6:.2f} | {row['peel']:.1f} | {row['march']:.1f} |"
-        )
+        figures = [number(row[key], 3) for key in ("pixels_p50", "pixels_p99")]
+        sizes = [f"{row['bytes'] / 1e6:.2f}", f"{row['peel']:.1f}", f"{row['march']:.1f}"]
+        body.append([row["scene"], row["search"], str(row["error"] or "usual 256"), *figures, *sizes])
+    lines += table(["scene", "search", "error, pixels", "p50", "p99", "MB", "peel, ms", "march, ms"], body)
+    lines += ["## Error against time", ""]
+    body = []
+    for point in result["error_against_time"]:
+        figures = [f"{point['milliseconds']['median']:.1f}", f"{point['ssim']:.5f}", f"{point['flip']:.6f}"]
+        body.append([point["curve"], point["label"], *figures])
+    return lines + table(["method", "parameter", "ms", "SSIM", "FLIP"], body)
+
+
+def _scaling_line(result: dict[str, Any]) -> list[str]:
     scaling = ", ".join(f"{name} {value:.2f}" for name, value in result["scaling"].items())
-    lines += ["", f"One thread over two: {scaling}.", "", "## The paper's tables", ""]
-    lines += ["| model | paper: layers, ms (GeForce 7800) | ours | layers, ms (this CPU) |", "|---|---|---|---|"]
+    return [f"One thread over two: {scaling}.", ""]
+
+
+def _paper_tables(result: dict[str, Any]) -> list[str]:
+    body = []
     for model, entry in result["paper"]["table_1"].items():
         paper, ours = entry["paper"], entry["ours"]
-        lines.append(
-            f"| {model}, {paper['triangles']} | {paper['layers']}, {paper['milliseconds']:.1f} | {ours['model']}, "
-            f"{ours['triangles']} | {ours['layers']}, {ours['milliseconds']:.1f} |"
-        )
-    lines += ["", "| scene | paper: reflector + reflection ms | ours: linear | exact |", "|---|---|---|---|"]
+        theirs = [f"{model}, {paper['triangles']}", f"{paper['layers']}, {paper['milliseconds']:.1f}"]
+        mine = [f"{ours['model']}, {ours['triangles']}", f"{ours['layers']}, {ours['milliseconds']:.1f}"]
+        body.append(theirs + mine)
+    lines = ["## The paper's tables", ""]
+    lines += table(["model", "paper: layers, ms (GeForce 7800)", "ours", "layers, ms (this CPU)"], body)
+    body = []
     for name, entry in result["paper"]["table_2"].items():
         paper, ours = entry["paper"], entry["ours"]
         total = paper["reflector"] + paper["reflection"]
-        lines.append(f"| {name} | {total:.1f} | {ours['linear']:.1f} | {ours['exact']:.1f} |")
-    lines += ["", "## Error against time", "", "| method | parameter | ms | SSIM | FLIP |", "|---|---|---|---|---|"]
-    for point in result["error_against_time"]:
-        lines.append(
-            f"| {point['curve']} | {point['label']} | {point['milliseconds']['median']:.1f} | {point['ssim']:.5f} | "
-            f"{point['flip']:.6f} |"
-        )
-    return "\n".join(lines) + "\n"
+        body.append([name, f"{total:.1f}", f"{ours['linear']:.1f}", f"{ours['exact']:.1f}"])
+    return lines + table(["scene", "paper: reflector + reflection ms", "ours: linear", "exact"], body)

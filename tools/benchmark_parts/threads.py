@@ -15,7 +15,9 @@ from ldtrefl.device_scene import DeviceMesh
 from ldtrefl.ldt import peel_mesh
 from ldtrefl.march import TRACERS
 
-from .common import KNOTS, Batch, mirror_rays
+from .common import Batch
+from .models import KNOTS
+from .rays import mirror_rays
 
 
 @launch.kernel

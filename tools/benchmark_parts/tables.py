@@ -1,0 +1,183 @@
+"""The tables of rays and of building, in Markdown."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from .ratios import larger_over_smaller, rival_over_ours, slower_than_bvh, time_of, with_outlier_over_without
+from .tracing import OLD_KIND
+
+OURS = ["ldt", "bvh"]
+FORMS = {"numpy": "public calls, numpy in and numpy out", "kernel": "kernels alone"}
+
+
+def table(columns: list[str], rows: list[list[str]]) -> list[str]:
+    """A Markdown table."""
+    return [f"| {' | '.join(columns)} |", "|" + "---|" * len(columns), *(f"| {' | '.join(row)} |" for row in rows), ""]
+
+
+def number(value: float | None, digits: int = 2) -> str:
+    """A figure, or a dash where there is none."""
+    return "-" if value is None else f"{value:.{digits}f}"
+
+
+def rays_tables(result: dict[str, Any]) -> list[str]:
+    """Summary, rates and errors."""
+    rows, threads = result["rays"], [str(count) for count in result["threads"]]
+    rivals = [name for name in result["rivals"] if name != "Mitsuba scalar"]
+    lines = ["## Rivals over ours", ""]
+    lines += [f"- {note}" for note in result["notes"]]
+    if not _has_occluded(rows):
+        lines.append("- `occluded` of the public classes: not there; any-hit rays are timed by kernels alone.")
+    lines += [
+        "",
+        "Time of the other over time of `ldt`, one thread: the median over kinds of rays of closest hits (the",
+    ]
+    lines += ["least), and of any-hit rays the least. Above 1, `ldt` is faster.", ""]
+    lines += _ratio_table(rows, [*rivals, "bvh"], threads)
+    lines += _larger_and_outliers(rows, [*OURS, *rivals])
+    slower = slower_than_bvh(rows, threads)
+    lines += [
+        "",
+        f"Rows where `bvh` is faster than `ldt`: {len(slower) or 'none'}.",
+        *(f"- {row}" for row in slower),
+        "",
+    ]
+    for form, label in FORMS.items():
+        for count in threads:
+            lines += [f"## Million rays a second: {label}, threads: {count}", ""]
+            lines += _rate_table(rows, form, count, [*OURS, *result["rivals"]])
+    return lines + ["## Errors", "", *_error_table(rows), *_old_table(rows)]
+
+
+def _has_occluded(rows: list[dict[str, Any]]) -> bool:
+    return any("ldt" in e["milliseconds"]["1"]["numpy"] for row in rows for e in row["kinds"].values() if e["any_hit"])
+
+
+def _ratio_table(rows: list[dict[str, Any]], others: list[str], threads: list[str]) -> list[str]:
+    columns = ["mesh", "triangles", "calls", *(f"{other} / ldt" for other in others)]
+    columns += [f"{tracer}: 1 over {threads[-1]} threads" for tracer in OURS]
+    body = []
+    for entry in rival_over_ours(rows, others, threads):
+        cells = [entry["mesh"], str(entry["triangles"]), entry["form"]]
+        for other in others:
+            over = entry["over"].get(other)
+            if over is None:
+                cells.append("-")
+            else:
+                cells.append(f"{number(over['closest'])} ({number(over['least'])}), any {number(over['any_hit'])}")
+        body.append(cells + [number(entry["one_over_all"].get(tracer)) for tracer in OURS])
+    return table(columns, body)
+
+
+def _larger_and_outliers(rows: list[dict[str, Any]], tracers: list[str]) -> list[str]:
+    lines = []
+    larger = larger_over_smaller(rows, tracers)
+    if larger:
+        kinds = list(dict.fromkeys(kind for by in larger.values() for ratios in by.values() for kind in ratios))
+        lines += ["Time on the knot of 2 M triangles over that of 96 k, one thread:", ""]
+        body = [
+            [form, tracer, *(number(ratios.get(kind)) for kind in kinds)]
+            for form, by in larger.items()
+            for tracer, ratios in by.items()
+        ]
+        lines += table(["calls", "tracer", *kinds], body)
+    outliers = with_outlier_over_without(rows, tracers)
+    if outliers:
+        lines += ["Time with an outlier over that without, one thread, median (worst) over kinds:", ""]
+        names = [tracer for tracer in tracers if any(entry["tracer"] == tracer for entry in outliers)]
+        body = []
+        for mesh, form in dict.fromkeys((entry["mesh"], entry["form"]) for entry in outliers):
+            found = {e["tracer"]: e for e in outliers if (e["mesh"], e["form"]) == (mesh, form)}
+            cells = [
+                f"{number(found[n]['median'])} ({number(found[n]['worst'])})" if n in found else "-" for n in names
+            ]
+            body.append([mesh, form, *cells])
+        lines += table(["mesh", "calls", *names], body)
+    return lines
+
+
+def _rate_table(rows: list[dict[str, Any]], form: str, threads: str, tracers: list[str]) -> list[str]:
+    body = []
+    shown = tracers if form == "numpy" else ["ldt", "ldt exact", *tracers[1:]]
+    shown = [t for t in shown if any(time_of(e, form, t, threads) for row in rows for e in row["kinds"].values())]
+    for row in rows:
+        for kind, entry in row["kinds"].items():
+            rates = []
+            for tracer in shown:
+                time = time_of(entry, form, tracer, threads)
+                rates.append(number(None if time is None else entry["rays"] / 1000 / time))
+            hits = f"{100 * entry['hits'] / max(entry['rays'], 1):.0f}"
+            body.append([row["mesh"], kind, str(entry["rays"]), hits, *rates])
+    return table(["mesh", "rays", "number", "hits, %", *shown], body)
+
+
+def _error_table(rows: list[dict[str, Any]]) -> list[str]:
+    lines = [
+        "Wrong hits and misses in percent of true hits, distances in texels of a 128 map, same triangle in percent of"
+    ]
+    lines += [
+        "common hits. Undecided rays pass within 1e-7 of the mesh's size of an edge and are judged by nobody.",
+        "",
+    ]
+    body = []
+    for row in rows:
+        for kind, entry in row["kinds"].items():
+            cells = [row["mesh"], kind, f"{entry['disputed']}, {entry['unsure']}"]
+            for tracer in ("bvh", "embreex", "ldt exact", "ldt"):
+                wrong = entry["errors"].get(tracer)
+                cells.append("-" if wrong is None else f"{wrong['wrong_hits']:.4f}, {wrong['wrong_misses']:.4f}")
+            for tracer in ("ldt exact", "ldt"):
+                wrong = entry["errors"].get(tracer, {})
+                cells.append(", ".join(number(wrong.get(key), 3) for key in ("p99", "p999", "same_triangle")))
+            body.append(cells)
+    columns = ["mesh", "rays", "disputed, undecided", "bvh: wrong hits, misses", "embreex", "ldt exact", "ldt"]
+    return lines + table([*columns, "ldt exact: p99, p99.9, same", "ldt: p99, p99.9, same"], body)
+
+
+def _old_table(rows: list[dict[str, Any]]) -> list[str]:
+    """Milliseconds of the rays that a frame's mirror ball sends, in the order of earlier reports."""
+    tracers = ["bvh", "embreex", "ldt exact", "ldt", "ldt fast", "ldt linear"]
+    body = []
+    for row in rows:
+        entry = row["kinds"].get(OLD_KIND)
+        if entry is None:
+            continue
+        times = [time_of(entry, "kernel", tracer) for tracer in tracers]
+        bvh, embree, exact, default = times[:4]
+        ratios = [
+            bvh and exact and bvh / exact,
+            bvh and default and bvh / default,
+            embree and default and embree / default,
+        ]
+        body.append([row["mesh"], str(row["triangles"]), *(number(x) for x in (*times, *ratios))])
+    if not body:
+        return []
+    columns = ["mesh", "triangles", *tracers, "bvh / exact", "bvh / ldt", "embreex / ldt"]
+    return [f"## Milliseconds for the rays of a frame ({OLD_KIND}), kernels, one thread", "", *table(columns, body)]
+
+
+def build_tables(result: dict[str, Any]) -> list[str]:
+    """Milliseconds to build, and bytes."""
+    rows = result["build"]
+    lines = []
+    for form, label in (("numpy", "from numpy arrays"), ("kernel", "of a mesh on the device already")):
+        for count in map(str, result["threads"]):
+            names = list(dict.fromkeys(n for row in rows for n in row["milliseconds"][count][form]))
+            body = []
+            for row in rows:
+                times = row["milliseconds"][count][form]
+                one = row["milliseconds"]["1"][form]
+                cells = [number(times[n]["median"] if n in times else None, 1) for n in names]
+                cells.append(number(times["bvh"]["median"] / times["ldt"]["median"]))
+                cells.append(number(one["ldt"]["median"] / times["ldt"]["median"]))
+                body.append([row["mesh"], str(row["triangles"]), *cells])
+            lines += [f"## Build, milliseconds, {label}, threads: {count}", ""]
+            lines += table(["mesh", "triangles", *names, "bvh / ldt", "ldt: 1 thread over these"], body)
+    lines += ["## Bytes a triangle beside the mesh", ""]
+    names = list(dict.fromkeys(name for row in rows for name in row["bytes"]))
+    body = []
+    for row in rows:
+        each = [row["bytes"].get(name) for name in names]
+        body.append([row["mesh"], *(number(None if b is None else b / row["triangles"], 1) for b in each)])
+    return lines + table(["mesh", *names], body)
