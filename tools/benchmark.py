@@ -24,16 +24,17 @@ from typing import Any
 
 import warp as wp
 from benchmark_parts import cores
-from benchmark_parts.building import builds_of_meshes
+from benchmark_parts.building import build_line, builds_of_mesh
 from benchmark_parts.common import ROOT
 from benchmark_parts.frames import error_against_time, error_targets, frame_stages
-from benchmark_parts.models import every_name
+from benchmark_parts.memory import MEMORY_MESHES, memory_line, memory_of_mesh
+from benchmark_parts.models import every_name, model
 from benchmark_parts.paper import paper_tables
 from benchmark_parts.rays import RAYS
 from benchmark_parts.report import draw_plots, reading
 from benchmark_parts.rivals import RIVALS, available
 from benchmark_parts.threads import thread_scaling
-from benchmark_parts.tracing import rays_on_meshes
+from benchmark_parts.tracing import rays_line, rays_on_mesh
 
 import ldtrefl
 from ldtrefl.errors import InputError
@@ -103,10 +104,20 @@ def measured(arguments: argparse.Namespace) -> dict[str, Any]:
     }
     for note in notes:
         print(note, file=sys.stderr)
-    if "rays" in wanted:
-        result["rays"] = rays_on_meshes(names, rivals, rounds, rays, arguments.kinds)
-    if "build" in wanted:
-        result["build"] = builds_of_meshes(names, rivals, rounds)
+    for name in names if {"rays", "build", "memory"} & set(wanted) else ():
+        mesh = model(name)
+        if mesh is None:
+            print(f"{name}: not in LDTREFL_MESH_PATH, left out", file=sys.stderr)
+            continue
+        if "rays" in wanted:
+            result.setdefault("rays", []).append(rays_on_mesh(mesh, rivals, rounds, rays, arguments.kinds))
+            print(rays_line(result["rays"][-1]), flush=True)
+        if "build" in wanted:
+            result.setdefault("build", []).append(builds_of_mesh(mesh, rivals, rounds))
+            print(build_line(result["build"][-1]), flush=True)
+        if "memory" in wanted and (name in MEMORY_MESHES or arguments.meshes):
+            result.setdefault("memory", []).append(memory_of_mesh(mesh, rivals))
+            print(memory_line(result["memory"][-1]), flush=True)
     if "frames" in wanted:
         result["error_against_time"] = error_against_time(quick, frame_rounds)
         result["stages"] = frame_stages(quick, frame_rounds)

@@ -1,9 +1,9 @@
 """The meshes that rays are traced against, by name.
 
-``knot 96 k`` is a torus knot of that many triangles; ``lucy.ply`` a file of LDTREFL_MESH_PATH; ``city`` and
-``city nested`` ten thousand boxes of sizes over six decades. Words behind a name change it: ``loop 2`` refines by two
-of Loop's steps, ``rough`` moves vertices by a third of an edge, ``outlier 1e3`` adds one triangle a thousand sizes away, ``stray 1e3`` one
-that reaches from the mesh to there.
+``knot 96 k`` is a torus knot of that many triangles; ``lucy.ply`` a file of LDTREFL_MESH_PATH; ``city`` and ``city
+nested`` ten thousand boxes of sizes over six decades. Words behind a name change it: ``loop 2`` refines by two of
+Loop's steps, ``rough`` then moves vertices by a third of an edge, ``outlier 1e3`` adds one triangle a thousand sizes
+away, ``stray 1e3`` one that reaches from the mesh to there.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Kinds of rays against a mesh of side 2 about the origin, each as its users send them: in rows of pixels, or at random.
+"""Kinds of rays against a mesh of side 2 about the origin, as their users send them: in rows of pixels, or at random.
 
 Directions are unit vectors, float32. Closest hits: ``primary`` of a camera; ``mirror, few hits``, reflected off a ball
 beside the object, of which a third meet the object's box; ``mirror, many hits``, only those that meet it, as a renderer
@@ -169,12 +169,12 @@ def rays_from_outside(box: np.ndarray, rays: int, rng: np.random.Generator) -> t
     """From a sphere about the object to points of its box."""
     around = rng.normal(size=(rays, 3))
     around *= AROUND / np.linalg.norm(around, axis=1, keepdims=True)
-    return _single(around, rng.uniform(*box, (rays, 3)) - around)
+    return _single(around, rng.uniform(box[0], box[1], (rays, 3)) - around)
 
 
 def rays_from_within(box: np.ndarray, rays: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """From points of the box in all directions."""
-    return _single(rng.uniform(*box, (rays, 3)), rng.normal(size=(rays, 3)))
+    return _single(rng.uniform(box[0], box[1], (rays, 3)), rng.normal(size=(rays, 3)))
 
 
 def rays_at_triangles(model: Model, rays: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:

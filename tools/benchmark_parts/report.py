@@ -11,7 +11,7 @@ import numpy as np
 from ldtrefl.files import written_whole
 
 from .models import KNOTS
-from .tables import build_tables, number, rays_tables, table
+from .tables import build_tables, memory_table, number, rays_tables, table
 from .tracing import OLD_KIND
 
 matplotlib.use("Agg")
@@ -81,6 +81,7 @@ def reading(result: dict[str, Any]) -> str:
     for part, tables in (
         ("rays", rays_tables),
         ("build", build_tables),
+        ("memory", memory_table),
         ("stages", _frame_tables),
         ("scaling", _scaling_line),
         ("paper", _paper_tables),

@@ -1,9 +1,9 @@
 """Other people's ray tracers, as their users call them from Python.
 
-Each is a class with the same few methods as ours (``tracers.py``). Packages that are not installed, or do not start
-here, are reported in one line and left out: ``pip install -e .[peers]`` brings them. Mitsuba's ``llvm`` variants load an
-LLVM library of version 16 or newer, which pip does not bring: Debian has it as ``libllvm19``; where it is not found by
-itself, DRJIT_LIBLLVM_PATH names the file.
+Each is a class with the same few methods as ours (``ray_tracer.py``). Packages that are not installed, or do not start
+here, are reported in one line and left out: ``pip install -e .[peers]`` brings them. Two need what pip does not bring:
+Open3D loads libusb (Debian: ``libusb-1.0-0``), and Mitsuba's ``llvm`` variants an LLVM of version 16 or newer (Debian:
+``libllvm19``); where it is not found by itself, DRJIT_LIBLLVM_PATH names the file.
 """
 
 from __future__ import annotations
@@ -15,59 +15,22 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from .ray_tracer import RayTracer
 from .rays import EYE, FIELD, Rays
 
-MISS_MITSUBA = np.uint32(0xFFFFFFFF)
+MOST_TRIANGLES = 4_000_000
+"""Up to which all are run: three more trees of Embree's, of a gigabyte each, would be kept beside the first."""
 
 SMALLEST_SCENE = np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.int32)
 """One triangle, to see whether a rival starts."""
 
 
-class Rival:
-    """A scene of one mesh, ready for its first ray when made.
-
-    ``closest`` and ``occluded`` take and give numpy arrays: of closest hits all that the rival tells. ``prepared``
-    gives a call that traces rays which lie where the rival wants them, and asks for the least that it can be asked for.
-    """
-
-    name: ClassVar[str]
-    has_threads: ClassVar[bool] = True
-    """Whether tracing uses more than one."""
-    takes_arrays: ClassVar[bool] = True
-    """Whether it can be handed rays as arrays."""
-    most_triangles: ClassVar[int] = 4_000_000
-    """Left out above: memory for so many trees at a time."""
-
-    def __init__(self, vertices: np.ndarray, faces: np.ndarray) -> None:
-        raise NotImplementedError
+class Rival(RayTracer):
+    """Somebody else's."""
 
     @classmethod
     def load(cls) -> None:
         """Import what is needed; raises whatever it raises."""
-        raise NotImplementedError
-
-    @classmethod
-    def set_threads(cls, threads: int) -> None:
-        """Use so many threads from now on."""
-
-    def takes(self, rays: Rays) -> bool:
-        """Whether it can trace rays of this kind."""
-        return True
-
-    def closest(self, rays: Rays) -> Any:
-        """All that it tells of closest hits, as numpy arrays."""
-        raise NotImplementedError
-
-    def occluded(self, rays: Rays) -> Any:
-        """(n,) bool."""
-        raise NotImplementedError
-
-    def prepared(self, rays: Rays) -> Callable[[], Any]:
-        """A call that traces these rays for the least answer."""
-        raise NotImplementedError
-
-    def hits(self, rays: Rays) -> tuple[np.ndarray, np.ndarray]:
-        """(n,) distances, +inf on a miss, and (n,) int32 triangles, -1 on a miss."""
         raise NotImplementedError
 
 
@@ -76,7 +39,6 @@ class Embreex(Rival):
 
     name = "embreex"
     has_threads = False
-    most_triangles = 1 << 30
     _scene: ModuleType
     _mesh: ModuleType
 
@@ -110,6 +72,7 @@ class Open3d(Rival):
     """Open3D's RaycastingScene (Embree 4)."""
 
     name = "Open3D"
+    most_triangles = MOST_TRIANGLES
     _threads: ClassVar[int] = 0
     _o3d: ModuleType
 
@@ -151,6 +114,7 @@ class MitsubaLlvm(Rival):
     """Mitsuba 3's ``llvm_ad_rgb``: Embree, eight or sixteen rays at a time from compiled code."""
 
     name = "Mitsuba llvm"
+    most_triangles = MOST_TRIANGLES
     variant: ClassVar[str] = "llvm_ad_rgb"
     _mi: ModuleType
     _dr: ModuleType
@@ -221,7 +185,6 @@ class MitsubaScalar(MitsubaLlvm):
 
     name = "Mitsuba scalar"
     variant = "scalar_rgb"
-    takes_arrays = False
 
     @classmethod
     def load(cls) -> None:
@@ -239,7 +202,10 @@ class MitsubaScalar(MitsubaLlvm):
         self._built = self._mi.load_dict({"type": "scene", "mesh": self._shape})
 
     def takes(self, rays: Rays) -> bool:
-        return rays.size is not None and not rays.any_hit
+        return rays.size is not None
+
+    def takes_arrays(self, rays: Rays) -> bool:
+        return False
 
     def prepared(self, rays: Rays) -> Callable[[], Any]:
         self._mi.set_variant(self.variant)

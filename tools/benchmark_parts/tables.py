@@ -47,7 +47,7 @@ def rays_tables(result: dict[str, Any]) -> list[str]:
         for count in threads:
             lines += [f"## Million rays a second: {label}, threads: {count}", ""]
             lines += _rate_table(rows, form, count, [*OURS, *result["rivals"]])
-    return lines + ["## Errors", "", *_error_table(rows), *_old_table(rows)]
+    return [*lines, "## Errors", "", *_error_table(rows), *_old_table(rows)]
 
 
 def _has_occluded(rows: list[dict[str, Any]]) -> bool:
@@ -181,3 +181,16 @@ def build_tables(result: dict[str, Any]) -> list[str]:
         each = [row["bytes"].get(name) for name in names]
         body.append([row["mesh"], *(number(None if b is None else b / row["triangles"], 1) for b in each)])
     return lines + table(["mesh", *names], body)
+
+
+def memory_table(result: dict[str, Any]) -> list[str]:
+    """Megabytes, and times the mesh's own bytes."""
+    body = []
+    for row in result["memory"]:
+        for builder, entry in row["builders"].items():
+            own = row["mesh_bytes"]
+            cells = [f"{entry[key] / 1e6:.0f} ({entry[key] / own:.2f})" for key in ("kept", "peak")]
+            body.append([row["mesh"], str(row["triangles"]), f"{own / 1e6:.0f}", builder, *cells])
+    lines = ["## Memory while building, megabytes (times the mesh's own bytes)", ""]
+    lines += ["Growth of a process that has the mesh's arrays and has built a small mesh before; threads: all.", ""]
+    return lines + table(["mesh", "triangles", "mesh's own MB", "builder", "kept", "peak"], body)

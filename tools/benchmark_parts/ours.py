@@ -1,4 +1,4 @@
-"""Our own tracers with the methods that rivals have (``rivals.py``): the public classes, and their kernels alone."""
+"""Our own ray tracers: the public classes, and their kernels alone."""
 
 from __future__ import annotations
 
@@ -16,44 +16,50 @@ from ldtrefl.raycast import BVH
 from ldtrefl.trace import Tracer
 
 from .common import AnyHitBatch, Batch
+from .ray_tracer import RayTracer
 from .rays import Rays
+from .rivals import MOST_TRIANGLES
 
 
-class Ours:
-    """A structure of ours over one mesh; ``closest`` and ``occluded`` are the public calls, numpy in and numpy out."""
+class Ours(RayTracer):
+    """A structure of ours over one mesh."""
 
-    name: ClassVar[str]
+    is_default: ClassVar[bool] = False
+    """Whether it is what the public names give without options."""
     tracer: Tracer
     """Of its kernels."""
     built: Any
     """The public object."""
     view: Any
 
-    @staticmethod
-    def set_threads(threads: int) -> None:
+    @classmethod
+    def set_threads(cls, threads: int) -> None:
         ldtrefl.set_threads(threads)
 
-    @property
-    def nbytes(self) -> int | None:
-        """Bytes beside the mesh, where the structure tells."""
-        return getattr(self.built, "nbytes", None)
-
-    @property
-    def has_occluded(self) -> bool:
-        """Whether the public object answers any-hit queries."""
-        return hasattr(self.built, "occluded")
+    def takes_arrays(self, rays: Rays) -> bool:
+        return self.is_default and (not rays.any_hit or hasattr(self.built, "occluded"))
 
     def closest(self, rays: Rays) -> ldtrefl.Hits:
         return self.built.trace(rays.origins, rays.directions)
 
     def occluded(self, rays: Rays) -> np.ndarray:
-        return self.built.occluded(rays.origins, rays.directions)
+        if hasattr(self.built, "occluded"):
+            return np.asarray(self.built.occluded(rays.origins, rays.directions))
+        return self.any_hits(rays)
+
+    def any_hits(self, rays: Rays) -> np.ndarray:
+        """``occluded`` by the kernel alone."""
+        kernel = self._batch(AnyHitBatch, rays)
+        kernel()
+        return kernel.occluded.numpy()
 
     def prepared(self, rays: Rays) -> Callable[[], Any]:
         """The kernel over rays that lie in Warp's arrays."""
+        return self._batch(AnyHitBatch if rays.any_hit else Batch, rays)
+
+    def _batch(self, made: Any, rays: Rays) -> Any:
         device = launch.resolve_device(None)
         arrays = (wp.array(x, dtype=wp.vec3, device=device) for x in (rays.origins, rays.directions))
-        made = AnyHitBatch if rays.any_hit else Batch
         return made(self.tracer, self.view, *arrays, unit_frame=self.built.geometry.mesh.unit_frame)
 
     def hits(self, rays: Rays) -> tuple[np.ndarray, np.ndarray]:
@@ -65,6 +71,7 @@ class Caster(Ours):
     """``Raycaster``: Warp's BVH."""
 
     name = "bvh"
+    is_default = True
     tracer = BVH
 
     def __init__(self, vertices: np.ndarray, faces: np.ndarray) -> None:
@@ -76,6 +83,7 @@ class Peeled(Ours):
     """``peel(V, F)`` as it is by default."""
 
     name = "ldt"
+    is_default = True
     quality: ClassVar[Quality] = "balanced"
     search: ClassVar[str] = "exact"
 
@@ -91,6 +99,7 @@ class Exact(Peeled):
     """Every triangle is tested."""
 
     name = "ldt exact"
+    is_default = False
     quality = "exact"
 
 
@@ -98,6 +107,8 @@ class Fast(Peeled):
     """Texels are tested."""
 
     name = "ldt fast"
+    is_default = False
+    most_triangles = MOST_TRIANGLES
     quality = "fast"
 
 
@@ -105,4 +116,6 @@ class Linear(Peeled):
     """The paper's search."""
 
     name = "ldt linear"
+    is_default = False
+    most_triangles = MOST_TRIANGLES
     search = "linear"

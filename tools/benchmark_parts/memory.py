@@ -1,0 +1,87 @@
+"""Memory that building takes: what stays, and the most there was meanwhile, each builder in a process of its own.
+
+The process has the mesh as numpy arrays (float64 vertices and int32 faces for ours, as ``ldtrefl.Mesh`` holds them, and
+float32 vertices for rivals) and has built a small mesh before, so that code and pools are not counted.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import gc
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .models import Model, load
+from .ours import Caster, Exact, Ours, Peeled
+from .ray_tracer import RayTracer
+from .rivals import RIVALS, MitsubaScalar, Rival
+
+MEMORY_MESHES = ("knot 10 k", "knot 96 k", "knot 2 M", "knot 10 M", "lucy.ply", "lucy.ply loop 2 rough")
+"""Of a full run."""
+
+SMALL = "knot 1 k"
+SECONDS = 300.0
+
+EVERYBODY: tuple[type[RayTracer], ...] = (Peeled, Exact, Caster, *RIVALS)
+
+
+def memory_of_mesh(mesh: Model, rivals: Sequence[type[Rival]]) -> dict[str, Any]:
+    """Bytes kept and at the peak, by builder."""
+    theirs = [r.name for r in rivals if len(mesh.faces) <= r.most_triangles and r is not MitsubaScalar]
+    builders = {}
+    with tempfile.TemporaryDirectory() as folder:
+        np.save(Path(folder) / "vertices.npy", mesh.vertices.astype(np.float64))
+        np.save(Path(folder) / "faces.npy", mesh.faces)
+        for name in (Peeled.name, Exact.name, Caster.name, *theirs):
+            command = [sys.executable, "-m", "benchmark_parts.memory", name, folder]
+            environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+            done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=SECONDS, check=True)
+            builders[name] = json.loads(done.stdout.splitlines()[-1])
+    own = 8 * mesh.vertices.size + mesh.faces.nbytes
+    return {"mesh": mesh.name, "triangles": len(mesh.faces), "mesh_bytes": own, "builders": builders}
+
+
+def memory_line(row: dict[str, Any]) -> str:
+    """The peaks, times the mesh's own bytes."""
+    peaks = ", ".join(f"{name} {entry['peak'] / row['mesh_bytes']:.2f}" for name, entry in row["builders"].items())
+    return f"{row['mesh']:26s} {row['triangles']:9d}  peak memory while building, of the mesh's own bytes: {peaks}"
+
+
+def _growth(name: str, folder: Path) -> dict[str, int]:
+    """What this process grows by when it builds."""
+    builder = next(kind for kind in EVERYBODY if kind.name == name)
+    if issubclass(builder, Rival):
+        builder.load()
+    small = load(SMALL)
+    assert small is not None
+    as_taken = np.float64 if issubclass(builder, Ours) else np.float32
+    vertices, faces = (np.load(folder / f"{kind}.npy") for kind in ("vertices", "faces"))
+    vertices = vertices.astype(as_taken, copy=False)
+    warm_up = builder(small.vertices.astype(as_taken), small.faces)
+    del warm_up, small
+    gc.collect()
+    ctypes.CDLL(None).malloc_trim(0)
+    Path("/proc/self/clear_refs").write_text("5")  # the peak counts from now
+    before = _status("VmRSS")
+    built = builder(vertices, faces)
+    found = {"kept": max(_status("VmRSS") - before, 0), "peak": max(_status("VmHWM") - before, 0)}
+    del built
+    return found
+
+
+def _status(key: str) -> int:
+    """Bytes of a line of this process's status."""
+    lines = Path("/proc/self/status").read_text().splitlines()
+    return next(1024 * int(line.split()[1]) for line in lines if line.startswith(f"{key}:"))
+
+
+if __name__ == "__main__":
+    print(json.dumps(_growth(sys.argv[1], Path(sys.argv[2]))))

@@ -1,0 +1,56 @@
+"""What the benchmark asks of a ray tracer, ours (``ours.py``) or somebody else's (``rivals.py``)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, ClassVar
+
+import numpy as np
+
+from .rays import Rays
+
+
+class RayTracer:
+    """A scene of one mesh, ready for its first ray when made.
+
+    ``closest`` and ``occluded`` take and give numpy arrays: of closest hits all that is told. ``prepared`` gives a call
+    that traces rays which lie where the tracer wants them, and asks for the least that it can be asked for.
+    """
+
+    name: ClassVar[str]
+    has_threads: ClassVar[bool] = True
+    """Whether tracing uses more than one."""
+    most_triangles: ClassVar[int] = 1 << 30
+    """Left out above: memory for so many trees at a time."""
+
+    def __init__(self, vertices: np.ndarray, faces: np.ndarray) -> None:
+        """Build for (n, 3) float32 vertices and (m, 3) int32 faces."""
+        raise NotImplementedError
+
+    @classmethod
+    def set_threads(cls, threads: int) -> None:
+        """Use so many threads from now on."""
+
+    def takes(self, rays: Rays) -> bool:
+        """Whether it can trace rays of this kind at all."""
+        return True
+
+    def takes_arrays(self, rays: Rays) -> bool:
+        """Whether it has a call for them that takes and gives numpy arrays."""
+        return self.takes(rays)
+
+    def closest(self, rays: Rays) -> Any:
+        """All that it tells of closest hits, as numpy arrays."""
+        raise NotImplementedError
+
+    def hits(self, rays: Rays) -> tuple[np.ndarray, np.ndarray]:
+        """(n,) distances, +inf on a miss, and (n,) int32 triangles, -1 on a miss."""
+        raise NotImplementedError
+
+    def occluded(self, rays: Rays) -> np.ndarray:
+        """(n,) bool, by any-hit queries."""
+        raise NotImplementedError
+
+    def prepared(self, rays: Rays) -> Callable[[], Any]:
+        """A call that traces these rays for the least answer."""
+        raise NotImplementedError
