@@ -29,17 +29,20 @@ from benchmark_parts.common import ROOT
 from benchmark_parts.frames import error_against_time, error_targets, frame_stages
 from benchmark_parts.memory import MEMORY_MESHES, memory_line, memory_of_mesh
 from benchmark_parts.models import every_name, model
+from benchmark_parts.ours import OURS
 from benchmark_parts.paper import paper_tables
 from benchmark_parts.rays import RAYS
 from benchmark_parts.report import draw_plots, reading
 from benchmark_parts.rivals import RIVALS, available
 from benchmark_parts.threads import thread_scaling
-from benchmark_parts.tracing import rays_line, rays_on_mesh
+from benchmark_parts.tracing import Plan, rays_line, rays_on_mesh
 
 import ldtrefl
 from ldtrefl.errors import InputError
 from ldtrefl.files import written_whole
 
+TRACERS = (*OURS, *RIVALS)
+ALL_TRACERS = ", ".join(tracer.name for tracer in TRACERS)
 PARTS = ("rays", "build", "memory", "frames", "threads", "paper")
 QUICK_MESHES = ("knot 1 k", "knot 10 k", "knot 10 k outlier 1e3")
 QUICK_RAYS = 8000
@@ -73,15 +76,21 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--only", type=names, default=list(PARTS), help=f"parts, of {', '.join(PARTS)}")
     parser.add_argument("--meshes", type=names, default=[], help="of rays and build, by name, with commas between")
     parser.add_argument("--kinds", type=kinds, default=[], help="of rays, with semicolons between")
-    parser.add_argument("--rivals", type=names, default=[r.name for r in RIVALS], help="which, or 'none'")
+    parser.add_argument("--tracers", type=names, default=[t.name for t in TRACERS], help="default: " + ALL_TRACERS)
+    parser.add_argument("--threads", type=int, nargs="+", help="numbers of them; default: 1, and all cores")
     parser.add_argument("--rounds", type=int, help="that count, of each timing")
     parser.add_argument("--rays", type=int, help="of each kind, about")
     parser.add_argument("-o", "--output", type=Path, help="folder to write to; default of a full run: tools/results")
     arguments = parser.parse_args()
-    for part in arguments.only:
-        if part not in PARTS:
-            parser.error(f"unknown part {part!r}, allowed are {', '.join(PARTS)}")
-    is_whole = list(arguments.only) == list(PARTS) and not arguments.meshes and not arguments.kinds
+    for what, given, allowed in (
+        ("part", arguments.only, PARTS),
+        ("tracer", arguments.tracers, ALL_TRACERS.split(", ")),
+    ):
+        for name in given:
+            if name not in allowed:
+                parser.error(f"unknown {what} {name!r}, allowed are {', '.join(allowed)}")
+    is_whole = list(arguments.only) == list(PARTS) and not (arguments.meshes or arguments.kinds or arguments.threads)
+    is_whole = is_whole and len(arguments.tracers) == len(TRACERS)
     if arguments.output is None and is_whole:
         arguments.output = ROOT / "tools" / "results"
     return arguments
@@ -90,14 +99,16 @@ def _arguments() -> argparse.Namespace:
 def measured(arguments: argparse.Namespace) -> dict[str, Any]:
     """The figures of the parts that are wanted."""
     quick, wanted = arguments.quick, arguments.only
-    rivals, notes = available(arguments.rivals)
+    rivals, notes = available(arguments.tracers)
+    tracers = [*(kind for kind in OURS if kind.name in arguments.tracers), *rivals]
     names = arguments.meshes or (list(QUICK_MESHES) if quick else every_name())
     rounds = arguments.rounds or (2 if quick else 5)
     frame_rounds = arguments.rounds or (2 if quick else 9)
-    rays = arguments.rays or (QUICK_RAYS if quick else RAYS)
+    threads = sorted(set(arguments.threads or (1, len(cores.ALL))))
+    plan = Plan(threads, arguments.rays or (QUICK_RAYS if quick else RAYS), arguments.kinds)
     result: dict[str, Any] = {
         "machine": f"{cores.processor()}, Warp {wp.__version__}",
-        "threads": sorted({1, len(cores.ALL)}),
+        "threads": threads,
         "rivals": [rival.name for rival in rivals],
         "notes": notes,
         "quick": quick,
@@ -110,13 +121,13 @@ def measured(arguments: argparse.Namespace) -> dict[str, Any]:
             print(f"{name}: not in LDTREFL_MESH_PATH, left out", file=sys.stderr)
             continue
         if "rays" in wanted:
-            result.setdefault("rays", []).append(rays_on_mesh(mesh, rivals, rounds, rays, arguments.kinds))
+            result.setdefault("rays", []).append(rays_on_mesh(mesh, tracers, rounds, plan))
             print(rays_line(result["rays"][-1]), flush=True)
         if "build" in wanted:
-            result.setdefault("build", []).append(builds_of_mesh(mesh, rivals, rounds))
+            result.setdefault("build", []).append(builds_of_mesh(mesh, tracers, rounds, threads))
             print(build_line(result["build"][-1]), flush=True)
         if "memory" in wanted and (name in MEMORY_MESHES or arguments.meshes):
-            result.setdefault("memory", []).append(memory_of_mesh(mesh, rivals))
+            result.setdefault("memory", []).append(memory_of_mesh(mesh, tracers))
             print(memory_line(result["memory"][-1]), flush=True)
     if "frames" in wanted:
         result["error_against_time"] = error_against_time(quick, frame_rounds)

@@ -14,46 +14,49 @@ from ldtrefl.device_scene import DeviceMesh
 from ldtrefl.ldt import peel_mesh
 from ldtrefl.raycast import Raycaster
 
-from .cores import ALL, threads
+from .cores import threads
 from .models import Model
-from .ours import Caster, Fast, Ours, Peeled
+from .ours import Caster, Exact, Fast, Linear, Peeled
 from .ray_tracer import RayTracer
-from .rivals import MitsubaScalar, Rival
+
+MAKERS: dict[str, Callable[[DeviceMesh], Any]] = {
+    Peeled.name: peel_mesh,
+    Caster.name: Raycaster.of,
+    Exact.name: functools.partial(peel_mesh, quality="exact"),
+    Fast.name: functools.partial(peel_mesh, quality="fast"),
+    Linear.name: functools.partial(peel_mesh, search="linear"),
+}
+"""What builds on a mesh that is on the device already, by name."""
 
 MOST_SECONDS = 6.0
 """For the rounds of one mesh, on one number of threads: large ones are built once or twice by each."""
 
 
-def builds_of_mesh(mesh: Model, rivals: Sequence[type[Rival]], rounds: int) -> dict[str, Any]:
+def builds_of_mesh(
+    mesh: Model, tracers: Sequence[type[RayTracer]], rounds: int, counts: Sequence[int]
+) -> dict[str, Any]:
     """Milliseconds and bytes: "numpy" from arrays, "kernel" for a mesh that is on the device already."""
-    theirs = [rival for rival in rivals if len(mesh.faces) <= rival.most_triangles and rival is not MitsubaScalar]
-    everybody: tuple[type[RayTracer], ...] = (Peeled, Caster, *theirs)
-    public = {kind.name: functools.partial(kind, mesh.vertices, mesh.faces) for kind in everybody}
+    some = [kind for kind in tracers if len(mesh.faces) <= kind.most_triangles]
     geometry = DeviceMesh(ldtrefl.Mesh(mesh.vertices, mesh.faces), launch.resolve_device(None))
-    kernels: dict[str, Callable[[], Any]] = {
-        "ldt": functools.partial(peel_mesh, geometry),
-        "bvh": functools.partial(Raycaster.of, geometry),
-        "ldt exact": functools.partial(peel_mesh, geometry, quality="exact"),
+    makers = {
+        name: functools.partial(make, geometry) for name, make in MAKERS.items() if name in [k.name for k in some]
     }
-    if len(mesh.faces) <= Fast.most_triangles:
-        kernels["ldt fast"] = functools.partial(peel_mesh, geometry, quality="fast")
-        kernels["ldt linear"] = functools.partial(peel_mesh, geometry, search="linear")
-    jobs: dict[tuple[str, str], Callable[[], Any]] = {("numpy", name): job for name, job in public.items()}
-    jobs |= {("kernel", name): job for name, job in kernels.items()}
+    jobs: dict[tuple[str, str], Callable[[], Any]] = {("kernel", name): make for name, make in makers.items()}
+    for kind in some:
+        if kind.is_default:
+            jobs["numpy", kind.name] = functools.partial(kind, mesh.vertices, mesh.faces)
     found: dict[str, Any] = {}
-    for count in sorted({1, len(ALL)}):
-        with threads(count, (Ours, *theirs)):
+    for count in counts:
+        with threads(count, some):
             times = timed_in_turn({" ".join(key): job for key, job in jobs.items()}, rounds, MOST_SECONDS)
         found[str(count)] = {
-            form: {n: times[f"{form} {n}"] for f, n in jobs if f == form} for form in ("numpy", "kernel")
+            form: {name: times[f"{form} {name}"] for f, name in jobs if f == form} for form in ("numpy", "kernel")
         }
-    bytes_of = {name: job().nbytes for name, job in kernels.items() if name != "bvh"}
     return {
         "mesh": mesh.name,
         "triangles": len(mesh.faces),
-        "mesh_bytes": mesh.vertices.nbytes + mesh.faces.nbytes,
         "milliseconds": found,
-        "bytes": bytes_of,
+        "bytes": {name: make().nbytes for name, make in makers.items() if name != Caster.name},
     }
 
 

@@ -22,7 +22,7 @@ import numpy as np
 from .models import Model, load
 from .ours import Caster, Exact, Ours, Peeled
 from .ray_tracer import RayTracer
-from .rivals import RIVALS, MitsubaScalar, Rival
+from .rivals import RIVALS, Rival
 
 MEMORY_MESHES = ("knot 10 k", "knot 96 k", "knot 2 M", "knot 10 M", "lucy.ply", "lucy.ply loop 2 rough")
 """Of a full run."""
@@ -30,17 +30,17 @@ MEMORY_MESHES = ("knot 10 k", "knot 96 k", "knot 2 M", "knot 10 M", "lucy.ply", 
 SMALL = "knot 1 k"
 SECONDS = 300.0
 
-EVERYBODY: tuple[type[RayTracer], ...] = (Peeled, Exact, Caster, *RIVALS)
+EVERYBODY: tuple[type[RayTracer], ...] = (Peeled, Exact, Caster, *(kind for kind in RIVALS if kind.is_default))
 
 
-def memory_of_mesh(mesh: Model, rivals: Sequence[type[Rival]]) -> dict[str, Any]:
+def memory_of_mesh(mesh: Model, tracers: Sequence[type[RayTracer]]) -> dict[str, Any]:
     """Bytes kept and at the peak, by builder."""
-    theirs = [r.name for r in rivals if len(mesh.faces) <= r.most_triangles and r is not MitsubaScalar]
+    names = [kind.name for kind in tracers if kind in EVERYBODY and len(mesh.faces) <= kind.most_triangles]
     builders = {}
     with tempfile.TemporaryDirectory() as folder:
         np.save(Path(folder) / "vertices.npy", mesh.vertices.astype(np.float64))
         np.save(Path(folder) / "faces.npy", mesh.faces)
-        for name in (Peeled.name, Exact.name, Caster.name, *theirs):
+        for name in names:
             command = [sys.executable, "-m", "benchmark_parts.memory", name, folder]
             environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
             done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=SECONDS, check=True)

@@ -24,8 +24,6 @@ from .rivals import MOST_TRIANGLES
 class Ours(RayTracer):
     """A structure of ours over one mesh."""
 
-    is_default: ClassVar[bool] = False
-    """Whether it is what the public names give without options."""
     tracer: Tracer
     """Of its kernels."""
     built: Any
@@ -71,7 +69,6 @@ class Caster(Ours):
     """``Raycaster``: Warp's BVH."""
 
     name = "bvh"
-    is_default = True
     tracer = BVH
 
     def __init__(self, vertices: np.ndarray, faces: np.ndarray) -> None:
@@ -83,7 +80,6 @@ class Peeled(Ours):
     """``peel(V, F)`` as it is by default."""
 
     name = "ldt"
-    is_default = True
     quality: ClassVar[Quality] = "balanced"
     search: ClassVar[str] = "exact"
 
@@ -119,3 +115,6 @@ class Linear(Peeled):
     is_default = False
     most_triangles = MOST_TRIANGLES
     search = "linear"
+
+
+OURS: tuple[type[Ours], ...] = (Peeled, Caster, Exact, Fast, Linear)

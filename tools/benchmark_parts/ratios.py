@@ -13,57 +13,57 @@ SMALLER, LARGER = "knot 96 k", "knot 2 M"
 Row = dict[str, Any]
 
 
-def time_of(entry: dict[str, Any], form: str, tracer: str, threads: str = "1") -> float | None:
+def time_of(entry: dict[str, Any], form: str, tracer: str, threads: str) -> float | None:
     """Median milliseconds of a kind of rays, None where it was not measured."""
     found = entry["milliseconds"].get(threads, {}).get(form, {}).get(tracer)
     return None if found is None else found["median"]
 
 
-def over_kinds(row: Row, form: str, tracer: str, *, any_hit: bool, threads: str = "1") -> list[float]:
-    """The tracer's time over ours, a figure per kind of rays. One that has no threads is taken on one."""
+def over_kinds(row: Row, form: str, tracer: str, threads: str, *, any_hit: bool) -> list[float]:
+    """The tracer's time over ours, a figure per kind of rays."""
     ratios = []
     for entry in row["kinds"].values():
         if entry["any_hit"] != any_hit:
             continue
-        theirs = time_of(entry, form, tracer, threads) or time_of(entry, form, tracer, "1")
-        ours = time_of(entry, form, "ldt", threads)
+        theirs, ours = time_of(entry, form, tracer, threads), time_of(entry, form, "ldt", threads)
         if theirs and ours:
             ratios.append(theirs / ours)
     return ratios
 
 
 def rival_over_ours(rows: list[Row], rivals: list[str], threads: list[str]) -> list[Row]:
-    """Per mesh, form of call and rival: the median over kinds of closest hits, and the median and least of any hit."""
+    """Per mesh, form of call and rival, on the first number of threads: median and least over kinds of closest hits, and
+    the least of any hit."""
     found = []
     for row in rows:
         for form in ("numpy", "kernel"):
             entry: Row = {"mesh": row["mesh"], "triangles": row["triangles"], "form": form, "over": {}}
             for rival in rivals:
-                closest = over_kinds(row, form, rival, any_hit=False)
-                any_hit = over_kinds(row, form, rival, any_hit=True)
+                closest = over_kinds(row, form, rival, threads[0], any_hit=False)
+                any_hit = over_kinds(row, form, rival, threads[0], any_hit=True)
                 if closest or any_hit:
                     entry["over"][rival] = {
                         "closest": statistics.median(closest) if closest else None,
                         "least": min(closest) if closest else None,
                         "any_hit": min(any_hit) if any_hit else None,
                     }
-            entry["one_over_all"] = _one_over_all(row, form, threads[-1])
+            entry["few_over_many"] = _few_over_many(row, form, threads)
             found.append(entry)
     return found
 
 
-def _one_over_all(row: Row, form: str, threads: str) -> dict[str, float]:
-    """Per tracer, its time with one thread over that with all, median over kinds."""
+def _few_over_many(row: Row, form: str, threads: list[str]) -> dict[str, float]:
+    """Per tracer, its time with the fewest threads over that with the most, median over kinds."""
     ratios: dict[str, list[float]] = {}
     for entry in row["kinds"].values():
-        for tracer in entry["milliseconds"].get(threads, {}).get(form, {}):
-            one, many = time_of(entry, form, tracer, "1"), time_of(entry, form, tracer, threads)
-            if one and many:
-                ratios.setdefault(tracer, []).append(one / many)
+        for tracer in entry["milliseconds"][threads[-1]][form] if len(threads) > 1 else ():
+            few, many = time_of(entry, form, tracer, threads[0]), time_of(entry, form, tracer, threads[-1])
+            if few and many:
+                ratios.setdefault(tracer, []).append(few / many)
     return {tracer: statistics.median(values) for tracer, values in ratios.items()}
 
 
-def larger_over_smaller(rows: list[Row], tracers: list[str]) -> Row:
+def larger_over_smaller(rows: list[Row], tracers: list[str], threads: str) -> Row:
     """Per form, tracer and kind: time on the larger knot over time on the smaller, for as many rays."""
     by_name = {row["mesh"]: row["kinds"] for row in rows}
     found: Row = {}
@@ -74,7 +74,7 @@ def larger_over_smaller(rows: list[Row], tracers: list[str]) -> Row:
             ratios = {}
             for kind, larger in by_name[LARGER].items():
                 smaller = by_name[SMALLER].get(kind)
-                pair = (time_of(larger, form, tracer), smaller and time_of(smaller, form, tracer))
+                pair = (time_of(larger, form, tracer, threads), smaller and time_of(smaller, form, tracer, threads))
                 if smaller and pair[0] and pair[1]:
                     ratios[kind] = (pair[0] / larger["rays"]) / (pair[1] / smaller["rays"])
             if ratios:
@@ -82,7 +82,7 @@ def larger_over_smaller(rows: list[Row], tracers: list[str]) -> Row:
     return found
 
 
-def with_outlier_over_without(rows: list[Row], tracers: list[str]) -> list[Row]:
+def with_outlier_over_without(rows: list[Row], tracers: list[str], threads: str) -> list[Row]:
     """Per mesh with an outlier, form and tracer: the median and the worst over kinds of its time over that without."""
     by_name = {row["mesh"]: row["kinds"] for row in rows}
     found = []
@@ -95,7 +95,7 @@ def with_outlier_over_without(rows: list[Row], tracers: list[str]) -> list[Row]:
                 ratios = []
                 for kind, entry in kinds.items():
                     base = by_name[parts["base"]].get(kind)
-                    pair = (time_of(entry, form, tracer), base and time_of(base, form, tracer))
+                    pair = (time_of(entry, form, tracer, threads), base and time_of(base, form, tracer, threads))
                     if base and pair[0] and pair[1]:
                         ratios.append((pair[0] / entry["rays"]) / (pair[1] / base["rays"]))
                 if ratios:
@@ -113,5 +113,5 @@ def slower_than_bvh(rows: list[Row], threads: list[str]) -> list[str]:
                 for count in threads:
                     ours, bvh = time_of(entry, form, "ldt", count), time_of(entry, form, "bvh", count)
                     if ours and bvh and ours > bvh:
-                        found.append(f"{row['mesh']}, {kind}, {form}, threads {count}: {ours / bvh:.2f} x")
+                        found.append(f"{row['mesh']}, {kind}, {form}, threads: {count}: {ours / bvh:.2f} x")
     return found

@@ -18,6 +18,8 @@ class RayTracer:
     """
 
     name: ClassVar[str]
+    is_default: ClassVar[bool] = True
+    """Whether it is what its users get without options: then its public calls are timed, too."""
     has_threads: ClassVar[bool] = True
     """Whether tracing uses more than one."""
     most_triangles: ClassVar[int] = 1 << 30

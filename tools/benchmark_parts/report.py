@@ -20,17 +20,20 @@ from matplotlib import pyplot as plt
 
 def draw_plots(result: dict[str, Any], folder: Path) -> None:
     """Error against time, and time, build time and bytes against triangles, of the parts that were run."""
+    threads = str(result["threads"][0])
     if "error_against_time" in result:
         _plot_error_against_time(result["error_against_time"], folder)
     if "rays" in result:
         knots = {row["triangles"]: row["kinds"] for row in result["rays"] if row["mesh"] in KNOTS}
-        times = {n: kinds[OLD_KIND]["milliseconds"]["1"]["kernel"] for n, kinds in knots.items() if OLD_KIND in kinds}
-        label = "milliseconds for the rays of a frame, one thread"
+        times = {
+            n: kinds[OLD_KIND]["milliseconds"][threads]["kernel"] for n, kinds in knots.items() if OLD_KIND in kinds
+        }
+        label = f"milliseconds for the rays of a frame, threads: {threads}"
         _plot_against_triangles(_medians(times), label, folder / "time_against_triangles.png")
     if "build" in result:
         rows = [row for row in result["build"] if row["mesh"] in KNOTS]
-        times = {row["triangles"]: row["milliseconds"]["1"]["numpy"] for row in rows}
-        label = "milliseconds to build from numpy arrays, one thread"
+        times = {row["triangles"]: row["milliseconds"][threads]["numpy"] for row in rows}
+        label = f"milliseconds to build from numpy arrays, threads: {threads}"
         _plot_against_triangles(_medians(times), label, folder / "build_against_triangles.png")
         megabytes = {row["triangles"]: {n: b / 1e6 for n, b in row["bytes"].items()} for row in rows}
         _plot_against_triangles(megabytes, "megabytes beside the mesh", folder / "bytes_against_triangles.png")

@@ -185,6 +185,7 @@ class MitsubaScalar(MitsubaLlvm):
 
     name = "Mitsuba scalar"
     variant = "scalar_rgb"
+    is_default = False
 
     @classmethod
     def load(cls) -> None:

@@ -31,11 +31,11 @@ def rays_tables(result: dict[str, Any]) -> list[str]:
         lines.append("- `occluded` of the public classes: not there; any-hit rays are timed by kernels alone.")
     lines += [
         "",
-        "Time of the other over time of `ldt`, one thread: the median over kinds of rays of closest hits (the",
+        f"Time of the other over time of `ldt`, threads: {threads[0]}. Of closest hits the median over kinds of",
     ]
-    lines += ["least), and of any-hit rays the least. Above 1, `ldt` is faster.", ""]
+    lines += ["rays (the least), of any-hit rays the least. Above 1, `ldt` is faster.", ""]
     lines += _ratio_table(rows, [*rivals, "bvh"], threads)
-    lines += _larger_and_outliers(rows, [*OURS, *rivals])
+    lines += _larger_and_outliers(rows, [*OURS, *rivals], threads[0])
     slower = slower_than_bvh(rows, threads)
     lines += [
         "",
@@ -47,16 +47,22 @@ def rays_tables(result: dict[str, Any]) -> list[str]:
         for count in threads:
             lines += [f"## Million rays a second: {label}, threads: {count}", ""]
             lines += _rate_table(rows, form, count, [*OURS, *result["rivals"]])
-    return [*lines, "## Errors", "", *_error_table(rows), *_old_table(rows)]
+    return [*lines, "## Errors", "", *_error_table(rows), *_old_table(rows, threads[0])]
 
 
 def _has_occluded(rows: list[dict[str, Any]]) -> bool:
-    return any("ldt" in e["milliseconds"]["1"]["numpy"] for row in rows for e in row["kinds"].values() if e["any_hit"])
+    return any(
+        "ldt" in forms["numpy"]
+        for row in rows
+        for entry in row["kinds"].values()
+        if entry["any_hit"]
+        for forms in entry["milliseconds"].values()
+    )
 
 
 def _ratio_table(rows: list[dict[str, Any]], others: list[str], threads: list[str]) -> list[str]:
     columns = ["mesh", "triangles", "calls", *(f"{other} / ldt" for other in others)]
-    columns += [f"{tracer}: 1 over {threads[-1]} threads" for tracer in OURS]
+    columns += [f"{tracer}: {threads[0]} over {threads[-1]} threads" for tracer in OURS]
     body = []
     for entry in rival_over_ours(rows, others, threads):
         cells = [entry["mesh"], str(entry["triangles"]), entry["form"]]
@@ -66,25 +72,25 @@ def _ratio_table(rows: list[dict[str, Any]], others: list[str], threads: list[st
                 cells.append("-")
             else:
                 cells.append(f"{number(over['closest'])} ({number(over['least'])}), any {number(over['any_hit'])}")
-        body.append(cells + [number(entry["one_over_all"].get(tracer)) for tracer in OURS])
+        body.append(cells + [number(entry["few_over_many"].get(tracer)) for tracer in OURS])
     return table(columns, body)
 
 
-def _larger_and_outliers(rows: list[dict[str, Any]], tracers: list[str]) -> list[str]:
+def _larger_and_outliers(rows: list[dict[str, Any]], tracers: list[str], threads: str) -> list[str]:
     lines = []
-    larger = larger_over_smaller(rows, tracers)
+    larger = larger_over_smaller(rows, tracers, threads)
     if larger:
         kinds = list(dict.fromkeys(kind for by in larger.values() for ratios in by.values() for kind in ratios))
-        lines += ["Time on the knot of 2 M triangles over that of 96 k, one thread:", ""]
+        lines += ["Time on the knot of 2 M triangles over that of 96 k:", ""]
         body = [
             [form, tracer, *(number(ratios.get(kind)) for kind in kinds)]
             for form, by in larger.items()
             for tracer, ratios in by.items()
         ]
         lines += table(["calls", "tracer", *kinds], body)
-    outliers = with_outlier_over_without(rows, tracers)
+    outliers = with_outlier_over_without(rows, tracers, threads)
     if outliers:
-        lines += ["Time with an outlier over that without, one thread, median (worst) over kinds:", ""]
+        lines += ["Time with an outlier over that without, median (worst) over kinds:", ""]
         names = [tracer for tracer in tracers if any(entry["tracer"] == tracer for entry in outliers)]
         body = []
         for mesh, form in dict.fromkeys((entry["mesh"], entry["form"]) for entry in outliers):
@@ -123,7 +129,7 @@ def _error_table(rows: list[dict[str, Any]]) -> list[str]:
     body = []
     for row in rows:
         for kind, entry in row["kinds"].items():
-            cells = [row["mesh"], kind, f"{entry['disputed']}, {entry['unsure']}"]
+            cells = [row["mesh"], kind, str(entry["undecided"])]
             for tracer in ("bvh", "embreex", "ldt exact", "ldt"):
                 wrong = entry["errors"].get(tracer)
                 cells.append("-" if wrong is None else f"{wrong['wrong_hits']:.4f}, {wrong['wrong_misses']:.4f}")
@@ -131,11 +137,11 @@ def _error_table(rows: list[dict[str, Any]]) -> list[str]:
                 wrong = entry["errors"].get(tracer, {})
                 cells.append(", ".join(number(wrong.get(key), 3) for key in ("p99", "p999", "same_triangle")))
             body.append(cells)
-    columns = ["mesh", "rays", "disputed, undecided", "bvh: wrong hits, misses", "embreex", "ldt exact", "ldt"]
+    columns = ["mesh", "rays", "undecided", "bvh: wrong hits, misses", "embreex", "ldt exact", "ldt"]
     return lines + table([*columns, "ldt exact: p99, p99.9, same", "ldt: p99, p99.9, same"], body)
 
 
-def _old_table(rows: list[dict[str, Any]]) -> list[str]:
+def _old_table(rows: list[dict[str, Any]], threads: str) -> list[str]:
     """Milliseconds of the rays that a frame's mirror ball sends, in the order of earlier reports."""
     tracers = ["bvh", "embreex", "ldt exact", "ldt", "ldt fast", "ldt linear"]
     body = []
@@ -143,7 +149,7 @@ def _old_table(rows: list[dict[str, Any]]) -> list[str]:
         entry = row["kinds"].get(OLD_KIND)
         if entry is None:
             continue
-        times = [time_of(entry, "kernel", tracer) for tracer in tracers]
+        times = [time_of(entry, "kernel", tracer, threads) for tracer in tracers]
         bvh, embree, exact, default = times[:4]
         ratios = [
             bvh and exact and bvh / exact,
@@ -154,7 +160,11 @@ def _old_table(rows: list[dict[str, Any]]) -> list[str]:
     if not body:
         return []
     columns = ["mesh", "triangles", *tracers, "bvh / exact", "bvh / ldt", "embreex / ldt"]
-    return [f"## Milliseconds for the rays of a frame ({OLD_KIND}), kernels, one thread", "", *table(columns, body)]
+    return [
+        f"## Milliseconds for the rays of a frame ({OLD_KIND}), kernels, threads: {threads}",
+        "",
+        *table(columns, body),
+    ]
 
 
 def build_tables(result: dict[str, Any]) -> list[str]:
@@ -167,13 +177,15 @@ def build_tables(result: dict[str, Any]) -> list[str]:
             body = []
             for row in rows:
                 times = row["milliseconds"][count][form]
-                one = row["milliseconds"]["1"][form]
+                few = row["milliseconds"][str(result["threads"][0])][form]
                 cells = [number(times[n]["median"] if n in times else None, 1) for n in names]
-                cells.append(number(times["bvh"]["median"] / times["ldt"]["median"]))
-                cells.append(number(one["ldt"]["median"] / times["ldt"]["median"]))
+                cells.append(number(_quotient(times, "bvh", times, "ldt")))
+                cells.append(number(_quotient(few, "ldt", times, "ldt")))
                 body.append([row["mesh"], str(row["triangles"]), *cells])
             lines += [f"## Build, milliseconds, {label}, threads: {count}", ""]
-            lines += table(["mesh", "triangles", *names, "bvh / ldt", "ldt: 1 thread over these"], body)
+            lines += table(
+                ["mesh", "triangles", *names, "bvh / ldt", f"ldt: {result['threads'][0]} thread over these"], body
+            )
     lines += ["## Bytes a triangle beside the mesh", ""]
     names = list(dict.fromkeys(name for row in rows for name in row["bytes"]))
     body = []
@@ -181,6 +193,11 @@ def build_tables(result: dict[str, Any]) -> list[str]:
         each = [row["bytes"].get(name) for name in names]
         body.append([row["mesh"], *(number(None if b is None else b / row["triangles"], 1) for b in each)])
     return lines + table(["mesh", *names], body)
+
+
+def _quotient(above: dict[str, Any], upper: str, below: dict[str, Any], lower: str) -> float | None:
+    """One median over another, where both are known."""
+    return above[upper]["median"] / below[lower]["median"] if upper in above and lower in below else None
 
 
 def memory_table(result: dict[str, Any]) -> list[str]:

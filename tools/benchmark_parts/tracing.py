@@ -4,70 +4,90 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from timing import timed_in_turn
 
 from .cores import ALL, threads
 from .models import Model
-from .ours import Caster, Exact, Fast, Linear, Peeled
+from .ours import Caster, Exact, Fast, Linear, Ours, Peeled
 from .ray_tracer import RayTracer
 from .rays import RAYS, Rays, kinds_of
-from .rivals import Embreex, Rival
-from .truth import Truth, errors_of, truth, wrong_answers
+from .rivals import Embreex
+from .truth import errors_of, truth, wrong_answers
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is wanted."""
+
+    threads: Sequence[int]
+    rays: int = RAYS
+    kinds: Sequence[str] = ()
+    """All if empty."""
+
 
 OLD_KIND = "mirror, few hits"
 """The rays on which the paper's search and the fast quality are timed, too."""
 
+JUDGES = (Embreex.name, Caster.name, Exact.name, Peeled.name)
+"""Whose hits the rays of later bounces start from: the first that is there."""
+
 MOST_SECONDS = 20.0
 """For one kind of rays, on one number of threads: what is hopelessly slow is timed in fewer rounds."""
 
-Tracers = dict[str, RayTracer]
+Built = dict[str, RayTracer]
 
 
-def rays_on_mesh(
-    mesh: Model, rivals: Sequence[type[Rival]], rounds: int, rays: int = RAYS, kinds: Sequence[str] = ()
-) -> dict[str, Any]:
-    """Times and errors by kind of rays; ``kinds`` are those wanted, all if empty."""
-    tracers = _built(mesh, rivals)
-    judge = tracers.get(Embreex.name) or tracers[Caster.name]
+def rays_on_mesh(mesh: Model, tracers: Sequence[type[RayTracer]], rounds: int, plan: Plan) -> dict[str, Any]:
+    """Times and errors by kind of rays."""
+    built = _built(mesh, tracers)
+    judge = next(built[name] for name in JUDGES if name in built)
     measured = {}
-    for batch in kinds_of(mesh, lambda o, d: judge.hits(Rays("", o, d)), rays):
-        if not kinds or batch.kind in kinds:
-            measured[batch.kind] = _measured(mesh, batch, tracers, rounds)
+    for batch in kinds_of(mesh, lambda o, d: judge.hits(Rays("", o, d)), plan.rays):
+        if not plan.kinds or batch.kind in plan.kinds:
+            measured[batch.kind] = _measured(mesh, batch, built, rounds, plan)
     return {"mesh": mesh.name, "triangles": len(mesh.faces), "kinds": measured}
 
 
-def _built(mesh: Model, rivals: Sequence[type[Rival]]) -> Tracers:
-    everybody: tuple[type[RayTracer], ...] = (Peeled, Caster, Exact, Fast, Linear, *rivals)
-    kinds = [kind for kind in everybody if len(mesh.faces) <= kind.most_triangles]
-    for kind in kinds:
-        kind.set_threads(len(ALL))
-    return {kind.name: kind(mesh.vertices, mesh.faces) for kind in kinds}
+def _built(mesh: Model, tracers: Sequence[type[RayTracer]]) -> Built:
+    some = [tracer for tracer in tracers if len(mesh.faces) <= tracer.most_triangles]
+    for tracer in some:
+        tracer.set_threads(len(ALL))
+    return {tracer.name: tracer(mesh.vertices, mesh.faces) for tracer in some}
 
 
-def _measured(mesh: Model, batch: Rays, tracers: Tracers, rounds: int) -> dict[str, Any]:
+def _measured(mesh: Model, batch: Rays, built: Built, rounds: int, plan: Plan) -> dict[str, Any]:
     """Times and errors of everybody who takes these rays."""
-    taking = {name: tracer for name, tracer in tracers.items() if tracer.takes(batch)}
+    taking = {name: tracer for name, tracer in built.items() if tracer.takes(batch)}
     if batch.kind != OLD_KIND:
         taking = {name: tracer for name, tracer in taking.items() if name not in (Fast.name, Linear.name)}
     milliseconds = {}
-    for count in sorted({1, len(ALL)}):
+    for count in plan.threads:
         with threads(count, taking.values()):
             milliseconds[str(count)] = _times(batch, taking, count, rounds)
-    right = _right(mesh, batch, taking)
+    telling = {
+        name: tracer for name, tracer in taking.items() if isinstance(tracer, Ours) or tracer.takes_arrays(batch)
+    }
+    answers = {name: tracer.hits(batch) for name, tracer in telling.items()}
+    right = truth(mesh, batch, list(answers.values()))
+    if batch.any_hit:
+        hit = (right.triangle >= 0) & right.sure
+        errors = {name: wrong_answers(tracer.occluded(batch) & right.sure, hit) for name, tracer in telling.items()}
+    else:
+        errors = {name: errors_of(answer, right) for name, answer in answers.items()}
     return {
         "rays": len(batch.origins),
         "hits": int((right.triangle >= 0).sum()),
         "any_hit": batch.any_hit,
-        "disputed": right.disputed,
-        "unsure": int((~right.sure).sum()),
+        "undecided": int((~right.sure).sum()),
         "milliseconds": milliseconds,
-        "errors": _errors(batch, taking, right),
+        "errors": errors,
     }
 
 
-def _times(batch: Rays, taking: Tracers, count: int, rounds: int) -> dict[str, dict[str, Any]]:
+def _times(batch: Rays, taking: Built, count: int, rounds: int) -> dict[str, dict[str, Any]]:
     """Milliseconds by form of call ("numpy" or "kernel") and tracer, all in turn."""
     jobs: dict[tuple[str, str], Callable[[], Any]] = {}
     for name, tracer in taking.items():
@@ -83,30 +103,11 @@ def _times(batch: Rays, taking: Tracers, count: int, rounds: int) -> dict[str, d
     return found
 
 
-def _right(mesh: Model, batch: Rays, taking: Tracers) -> Truth:
-    """The truth of these rays as closest hits."""
-    exact = [name for name, tracer in taking.items() if isinstance(tracer, Rival) and tracer.takes_arrays(batch)]
-    answers = {name: taking[name].hits(batch) for name in (Caster.name, Exact.name, *exact)}
-    return truth(mesh, batch, answers, {Peeled.name: taking[Peeled.name].hits(batch)})
-
-
-def _errors(batch: Rays, taking: Tracers, right: Truth) -> dict[str, dict[str, float]]:
-    found = {}
-    for name, tracer in taking.items():
-        if isinstance(tracer, Rival) and not tracer.takes_arrays(batch):
-            continue
-        if batch.any_hit:
-            found[name] = wrong_answers(tracer.occluded(batch) & right.sure, (right.triangle >= 0) & right.sure)
-        else:
-            found[name] = errors_of(tracer.hits(batch), right)
-    return found
-
-
 def rays_line(row: dict[str, Any]) -> str:
-    """The mesh and million rays a second of ours and embreex's kernels, one thread, by kind."""
+    """The mesh and million rays a second of ours and embreex's kernels, by kind."""
     parts = []
     for kind, entry in row["kinds"].items():
-        times = entry["milliseconds"]["1"]["kernel"]
+        times = next(iter(entry["milliseconds"].values()))["kernel"]
         rates = (entry["rays"] / 1000 / times[name]["median"] for name in (Peeled.name, Embreex.name) if name in times)
         parts.append(f"{kind} {' / '.join(f'{rate:.1f}' for rate in rates)}")
     return f"{row['mesh']:26s} {row['triangles']:9d}  " + "; ".join(parts)

@@ -1,13 +1,13 @@
-"""What is right where tracers disagree, and how wrong each answer is.
+"""What is right where ray tracers disagree, and how wrong each answer is.
 
-Where all that claim to be exact agree, the truth is the triangle they name, its distance in float64. Elsewhere each
-triangle that anybody names is tested in float64 (signed volumes), and the first that the ray meets is the truth. A ray
-that passes within ``EDGE`` of the edges of that triangle is decided by rounding: it is counted, and judged by nobody.
+Every triangle that anybody names for a ray is tested in float64 (signed volumes), and the first that the ray meets is
+the truth; a ray for which nobody names one that it meets is a miss. A ray that passes within ``EDGE`` of the edges of
+that triangle is decided by rounding: it is counted, and judged by nobody.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,9 +17,6 @@ from .rays import Rays
 
 EDGE = 2e-7
 """1e-7 of the mesh's longest side, which is 2."""
-
-AGREED = 1e-5
-"""Distances that differ by less, for their length, are one hit of theirs, on one sheet of the surface."""
 
 SAME = 1e-6
 """Hits of two triangles so close along the ray are one: the triangles share an edge, or lie in one another."""
@@ -41,28 +38,23 @@ class Truth:
     """(n,) int64, -1 on a miss."""
     sure: np.ndarray
     """(n,) bool: not within rounding of an edge."""
-    disputed: int
-    """Rays on which exact tracers disagreed."""
 
 
-def truth(model: Model, rays: Rays, exact: Mapping[str, Answer], others: Mapping[str, Answer]) -> Truth:
-    """The truth about these rays, from answers that claim to be exact, and from others that name triangles to test."""
-    t = np.stack([answer[0] for answer in exact.values()]).astype(float)
-    hit = np.stack([answer[1] >= 0 for answer in exact.values()])
-    with np.errstate(invalid="ignore"):  # two misses are inf apart from one another
-        apart = np.ptp(np.where(hit, t, 0.0), axis=0) > AGREED * (1.0 + np.where(hit, t, 0.0).max(axis=0))
-    disputed = np.flatnonzero((hit.any(axis=0) != hit.all(axis=0)) | apart)
-    triangle = next(iter(exact.values()))[1].astype(np.int64)
-    distance = np.full(len(triangle), np.inf)
-    named = np.flatnonzero(triangle >= 0)
-    distance[named] = _meet(model, rays, named, triangle[named])[0]
-    sure = np.ones(len(triangle), bool)
+def truth(model: Model, rays: Rays, answers: Sequence[Answer]) -> Truth:
+    """The truth about these rays, from everybody's answers."""
+    named = np.stack([triangle for _, triangle in answers]).astype(np.int64)
+    triangle, distance = named[0], np.full(named.shape[1], np.inf)
+    sure = np.ones(named.shape[1], bool)
+    agreed = (named == triangle).all(axis=0)
+    known = np.flatnonzero(agreed & (triangle >= 0))
+    distance[known] = _meet(model, rays, known, triangle[known])[0]
+    disputed = np.flatnonzero(~agreed)
     if len(disputed):
-        candidates = np.stack([answer[1][disputed] for answer in (*exact.values(), *others.values())]).astype(np.int64)
+        candidates = named[:, disputed]
         there, margin = np.full(candidates.shape, np.inf), np.full(candidates.shape, -np.inf)
-        for row, named_here in enumerate(candidates):
-            known = named_here >= 0
-            there[row, known], margin[row, known] = _meet(model, rays, disputed[known], named_here[known])
+        for row, candidate in enumerate(candidates):
+            some = candidate >= 0
+            there[row, some], margin[row, some] = _meet(model, rays, disputed[some], candidate[some])
         there[(margin < -EDGE) | (there < 0.0)] = np.inf
         first = there.argmin(axis=0), np.arange(len(disputed))
         met = np.isfinite(there[first])
@@ -70,7 +62,7 @@ def truth(model: Model, rays: Rays, exact: Mapping[str, Answer], others: Mapping
         triangle[disputed] = np.where(met, candidates[first], -1)
         # A miss is sure: whatever anybody named is not met.
         sure[disputed] = ~met | (margin[first] > EDGE)
-    return Truth(distance, triangle, sure, len(disputed))
+    return Truth(distance, triangle, sure)
 
 
 def _meet(model: Model, rays: Rays, which: np.ndarray, triangle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
