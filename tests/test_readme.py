@@ -75,11 +75,18 @@ def test_benchmark_writes_what_it_promises(tmp_path: Path) -> None:
     plots = {f"{kind}.png" for kind in kinds}
     assert {path.name for path in tmp_path.iterdir()} == plots | {"benchmark.json", "benchmark.md"}
     result = json.loads((tmp_path / "benchmark.json").read_text())
-    assert {"machine", "meshes", "error_against_time", "stages", "scaling", "paper"} <= set(result)
-    assert result["meshes"] and result["paper"]
-    for row in result["meshes"]:
-        assert row["errors"]["ldt exact"]["wrong_hits"] + row["errors"]["ldt exact"]["wrong_misses"] <= 0.01
-        assert {"median", "min", "max"} <= set(row["milliseconds"]["bvh"])
+    parts = {"rays", "build", "memory", "error_against_time", "stages", "error_targets", "scaling", "paper"}
+    assert {"machine", "threads", "tracers", "notes"} | parts <= set(result)
+    assert all(result[part] for part in parts)
+    for row in result["rays"]:
+        assert len(row["kinds"]) >= 8
+        for kind in row["kinds"].values():
+            wrong = kind["errors"]["ldt exact"]
+            assert wrong["wrong_hits"] + wrong["wrong_misses"] <= 0.01
+            assert {"median", "min", "max"} <= set(kind["milliseconds"]["1"]["kernel"]["bvh"])
+    report = (tmp_path / "benchmark.md").read_text()
+    assert all(row["mesh"] in report for row in result["rays"])
+    assert all(note in report for note in result["notes"])
 
 
 def test_ablation_writes_what_it_promises(tmp_path: Path) -> None:

@@ -109,7 +109,7 @@ def measured(arguments: argparse.Namespace) -> dict[str, Any]:
     result: dict[str, Any] = {
         "machine": f"{cores.processor()}, Warp {wp.__version__}",
         "threads": threads,
-        "rivals": [rival.name for rival in rivals],
+        "tracers": [tracer.name for tracer in tracers],
         "notes": notes,
         "quick": quick,
     }

@@ -32,8 +32,8 @@ def over_kinds(row: Row, form: str, tracer: str, threads: str, *, any_hit: bool)
 
 
 def rival_over_ours(rows: list[Row], rivals: list[str], threads: list[str]) -> list[Row]:
-    """Per mesh, form of call and rival, on the first number of threads: median and least over kinds of closest hits, and
-    the least of any hit."""
+    """Per mesh, form of call and rival, on the first number of threads: the median and the least over kinds of closest
+    hits, and the least of any hit."""
     found = []
     for row in rows:
         for form in ("numpy", "kernel"):

@@ -24,7 +24,7 @@ def number(value: float | None, digits: int = 2) -> str:
 def rays_tables(result: dict[str, Any]) -> list[str]:
     """Summary, rates and errors."""
     rows, threads = result["rays"], [str(count) for count in result["threads"]]
-    rivals = [name for name in result["rivals"] if name != "Mitsuba scalar"]
+    others = [name for name in result["tracers"] if not name.startswith("ldt")]
     lines = ["## Rivals over ours", ""]
     lines += [f"- {note}" for note in result["notes"]]
     if not _has_occluded(rows):
@@ -34,8 +34,8 @@ def rays_tables(result: dict[str, Any]) -> list[str]:
         f"Time of the other over time of `ldt`, threads: {threads[0]}. Of closest hits the median over kinds of",
     ]
     lines += ["rays (the least), of any-hit rays the least. Above 1, `ldt` is faster.", ""]
-    lines += _ratio_table(rows, [*rivals, "bvh"], threads)
-    lines += _larger_and_outliers(rows, [*OURS, *rivals], threads[0])
+    lines += _ratio_table(rows, others, threads)
+    lines += _larger_and_outliers(rows, ["ldt", *others], threads[0])
     slower = slower_than_bvh(rows, threads)
     lines += [
         "",
@@ -46,7 +46,7 @@ def rays_tables(result: dict[str, Any]) -> list[str]:
     for form, label in FORMS.items():
         for count in threads:
             lines += [f"## Million rays a second: {label}, threads: {count}", ""]
-            lines += _rate_table(rows, form, count, [*OURS, *result["rivals"]])
+            lines += _rate_table(rows, form, count, result["tracers"])
     return [*lines, "## Errors", "", *_error_table(rows), *_old_table(rows, threads[0])]
 
 
@@ -105,8 +105,7 @@ def _larger_and_outliers(rows: list[dict[str, Any]], tracers: list[str], threads
 
 def _rate_table(rows: list[dict[str, Any]], form: str, threads: str, tracers: list[str]) -> list[str]:
     body = []
-    shown = tracers if form == "numpy" else ["ldt", "ldt exact", *tracers[1:]]
-    shown = [t for t in shown if any(time_of(e, form, t, threads) for row in rows for e in row["kinds"].values())]
+    shown = [t for t in tracers if any(time_of(e, form, t, threads) for row in rows for e in row["kinds"].values())]
     for row in rows:
         for kind, entry in row["kinds"].items():
             rates = []
