@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from benchmark_parts import ratios, rivals, tables
+from benchmark_parts import ratios, report, rivals, tables
 from benchmark_parts.models import model
 from benchmark_parts.rays import RAYS, Rays, enters, kinds_of, second_bounce
 from benchmark_parts.rivals import Embreex, Rival, available
@@ -127,13 +127,18 @@ def row(mesh: str, **milliseconds: float) -> ratios.Row:
 def test_ratios_are_of_the_times_that_they_name() -> None:
     base, larger, outlier = "knot 96 k", "knot 2 M", "knot 96 k outlier 1e3"
     rows = [row(base, ldt=2.0, bvh=5.0), row(larger, ldt=3.0, bvh=2.0), row(outlier, ldt=8.0)]
-    summary = [entry for entry in ratios.rival_over_ours(rows, ["bvh"], ["1"]) if entry["form"] == "kernel"]
+    summary = [entry for entry in ratios.rival_over_ours(rows, ["bvh"], "1") if entry["form"] == "kernel"]
     assert summary[0]["over"]["bvh"] == {"closest": 2.5, "least": 2.5, "any_hit": 2.5}
     assert ratios.larger_over_smaller(rows, ["ldt"], "1")["kernel"]["ldt"]["two"] == pytest.approx(1.5)
     assert ratios.with_outlier_over_without(rows, ["ldt"], "1") == [
         {"mesh": "knot 96 k outlier 1e3", "form": "kernel", "tracer": "ldt", "median": 4.0, "worst": 4.0}
     ]
     assert len(ratios.slower_than_bvh(rows, ["1"])) == 3
+
+
+def test_fastest_rounds_take_the_medians_place() -> None:
+    timed = {"rows": [{"ldt": {"median": 2.0, "min": 1.0, "max": 3.0}}], "other": 5}
+    assert report.of_fastest(timed) == {"rows": [{"ldt": {"median": 1.0, "min": 1.0, "max": 3.0}}], "other": 5}
 
 
 def test_a_rival_that_does_not_start_is_named_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:

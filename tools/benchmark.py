@@ -17,6 +17,7 @@ from LDTREFL_MESH_PATH where they are; kinds of rays are described in ``benchmar
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import json
 import sys
 from pathlib import Path
@@ -28,11 +29,11 @@ from benchmark_parts.building import build_line, builds_of_mesh
 from benchmark_parts.common import ROOT
 from benchmark_parts.frames import error_against_time, error_targets, frame_stages
 from benchmark_parts.memory import MEMORY_MESHES, memory_line, memory_of_mesh
-from benchmark_parts.models import every_name, model
+from benchmark_parts.models import OUTLIERS, every_name, model
 from benchmark_parts.ours import OURS
 from benchmark_parts.paper import paper_tables
 from benchmark_parts.rays import RAYS
-from benchmark_parts.report import draw_plots, reading
+from benchmark_parts.report import draw_plots, of_fastest, reading
 from benchmark_parts.rivals import RIVALS, available
 from benchmark_parts.threads import thread_scaling
 from benchmark_parts.tracing import Plan, rays_line, rays_on_mesh
@@ -47,12 +48,15 @@ PARTS = ("rays", "build", "memory", "frames", "threads", "paper")
 QUICK_MESHES = ("knot 1 k", "knot 10 k", "knot 10 k outlier 1e3")
 QUICK_RAYS = 8000
 
+OUTLIER_TRACERS = ("ldt", "bvh", "embreex")
+"""Whom a full run times with outliers, on one thread: they are many, and a tree does not mind them."""
+
 
 def main() -> None:
     """Run the parts that are wanted and write JSON, Markdown and plots."""
     arguments = _arguments()
     result = measured(arguments)
-    report = reading(result)
+    report = reading(of_fastest(result) if arguments.fastest else result)
     if arguments.output is None:
         print(report)
         return
@@ -79,6 +83,9 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--tracers", type=names, default=[t.name for t in TRACERS], help="default: " + ALL_TRACERS)
     parser.add_argument("--threads", type=int, nargs="+", help="numbers of them; default: 1, and all cores")
     parser.add_argument("--rounds", type=int, help="that count, of each timing")
+    parser.add_argument(
+        "--fastest", action="store_true", help="report fastest rounds, where others use the machine, too"
+    )
     parser.add_argument("--rays", type=int, help="of each kind, about")
     parser.add_argument("-o", "--output", type=Path, help="folder to write to; default of a full run: tools/results")
     arguments = parser.parse_args()
@@ -111,6 +118,7 @@ def measured(arguments: argparse.Namespace) -> dict[str, Any]:
         "threads": threads,
         "tracers": [tracer.name for tracer in tracers],
         "notes": notes,
+        "statistic": "fastest rounds" if arguments.fastest else "medians",
         "quick": quick,
     }
     for note in notes:
@@ -121,7 +129,10 @@ def measured(arguments: argparse.Namespace) -> dict[str, Any]:
             print(f"{name}: not in LDTREFL_MESH_PATH, left out", file=sys.stderr)
             continue
         if "rays" in wanted:
-            result.setdefault("rays", []).append(rays_on_mesh(mesh, tracers, rounds, plan))
+            is_brief = name in OUTLIERS and not arguments.meshes
+            some = [tracer for tracer in tracers if not is_brief or tracer.name in OUTLIER_TRACERS]
+            those = dataclasses.replace(plan, threads=threads[:1]) if is_brief else plan
+            result.setdefault("rays", []).append(rays_on_mesh(mesh, some, rounds, those))
             print(rays_line(result["rays"][-1]), flush=True)
         if "build" in wanted:
             result.setdefault("build", []).append(builds_of_mesh(mesh, tracers, rounds, threads))

@@ -10,7 +10,6 @@ import warp as wp
 
 import ldtrefl
 from ldtrefl import launch
-from ldtrefl.grid_build import Quality
 from ldtrefl.march import TRACERS
 from ldtrefl.raycast import BVH
 from ldtrefl.trace import Tracer
@@ -80,7 +79,7 @@ class Peeled(Ours):
     """``peel(V, F)`` as it is by default."""
 
     name = "ldt"
-    quality: ClassVar[Quality] = "balanced"
+    quality: ClassVar[Any] = "balanced"
     search: ClassVar[str] = "exact"
 
     def __init__(self, vertices: np.ndarray, faces: np.ndarray) -> None:

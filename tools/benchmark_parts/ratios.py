@@ -31,32 +31,32 @@ def over_kinds(row: Row, form: str, tracer: str, threads: str, *, any_hit: bool)
     return ratios
 
 
-def rival_over_ours(rows: list[Row], rivals: list[str], threads: list[str]) -> list[Row]:
-    """Per mesh, form of call and rival, on the first number of threads: the median and the least over kinds of closest
-    hits, and the least of any hit."""
+def rival_over_ours(rows: list[Row], rivals: list[str], threads: str) -> list[Row]:
+    """Per mesh, form of call and rival: median and least over kinds of closest hits, and the least of any hit."""
     found = []
     for row in rows:
         for form in ("numpy", "kernel"):
             entry: Row = {"mesh": row["mesh"], "triangles": row["triangles"], "form": form, "over": {}}
             for rival in rivals:
-                closest = over_kinds(row, form, rival, threads[0], any_hit=False)
-                any_hit = over_kinds(row, form, rival, threads[0], any_hit=True)
+                closest = over_kinds(row, form, rival, threads, any_hit=False)
+                any_hit = over_kinds(row, form, rival, threads, any_hit=True)
                 if closest or any_hit:
                     entry["over"][rival] = {
                         "closest": statistics.median(closest) if closest else None,
                         "least": min(closest) if closest else None,
                         "any_hit": min(any_hit) if any_hit else None,
                     }
-            entry["few_over_many"] = _few_over_many(row, form, threads)
-            found.append(entry)
+            if entry["over"]:
+                found.append(entry)
     return found
 
 
-def _few_over_many(row: Row, form: str, threads: list[str]) -> dict[str, float]:
+def few_over_many(row: Row, form: str, threads: list[str]) -> dict[str, float]:
     """Per tracer, its time with the fewest threads over that with the most, median over kinds."""
     ratios: dict[str, list[float]] = {}
     for entry in row["kinds"].values():
-        for tracer in entry["milliseconds"][threads[-1]][form] if len(threads) > 1 else ():
+        many_threads = entry["milliseconds"].get(threads[-1], {}) if len(threads) > 1 else {}
+        for tracer in many_threads.get(form, ()):
             few, many = time_of(entry, form, tracer, threads[0]), time_of(entry, form, tracer, threads[-1])
             if few and many:
                 ratios.setdefault(tracer, []).append(few / many)

@@ -4,10 +4,17 @@ from __future__ import annotations
 
 from typing import Any
 
-from .ratios import larger_over_smaller, rival_over_ours, slower_than_bvh, time_of, with_outlier_over_without
+from .ratios import (
+    Row,
+    few_over_many,
+    larger_over_smaller,
+    rival_over_ours,
+    slower_than_bvh,
+    time_of,
+    with_outlier_over_without,
+)
 from .tracing import OLD_KIND
 
-OURS = ["ldt", "bvh"]
 FORMS = {"numpy": "public calls, numpy in and numpy out", "kernel": "kernels alone"}
 
 
@@ -29,12 +36,11 @@ def rays_tables(result: dict[str, Any]) -> list[str]:
     lines += [f"- {note}" for note in result["notes"]]
     if not _has_occluded(rows):
         lines.append("- `occluded` of the public classes: not there; any-hit rays are timed by kernels alone.")
-    lines += [
-        "",
-        f"Time of the other over time of `ldt`, threads: {threads[0]}. Of closest hits the median over kinds of",
-    ]
-    lines += ["rays (the least), of any-hit rays the least. Above 1, `ldt` is faster.", ""]
-    lines += _ratio_table(rows, others, threads)
+    lines += ["", "Time of the other over time of `ldt`: of closest hits the median over kinds of rays (the least), of"]
+    lines += ["any-hit rays the least. Above 1, `ldt` is faster.", ""]
+    for count in threads:
+        lines += [f"Threads: {count}.", "", *_ratio_table(rows, others, count)]
+    lines += _scaling_table(rows, result["tracers"], threads)
     lines += _larger_and_outliers(rows, ["ldt", *others], threads[0])
     slower = slower_than_bvh(rows, threads)
     lines += [
@@ -50,7 +56,7 @@ def rays_tables(result: dict[str, Any]) -> list[str]:
     return [*lines, "## Errors", "", *_error_table(rows), *_old_table(rows, threads[0])]
 
 
-def _has_occluded(rows: list[dict[str, Any]]) -> bool:
+def _has_occluded(rows: list[Row]) -> bool:
     return any(
         "ldt" in forms["numpy"]
         for row in rows
@@ -60,23 +66,33 @@ def _has_occluded(rows: list[dict[str, Any]]) -> bool:
     )
 
 
-def _ratio_table(rows: list[dict[str, Any]], others: list[str], threads: list[str]) -> list[str]:
-    columns = ["mesh", "triangles", "calls", *(f"{other} / ldt" for other in others)]
-    columns += [f"{tracer}: {threads[0]} over {threads[-1]} threads" for tracer in OURS]
+def _ratio_table(rows: list[Row], others: list[str], threads: str) -> list[str]:
+    entries = rival_over_ours(rows, others, threads)
+    shown = [other for other in others if any(other in entry["over"] for entry in entries)]
     body = []
-    for entry in rival_over_ours(rows, others, threads):
+    for entry in entries:
         cells = [entry["mesh"], str(entry["triangles"]), entry["form"]]
-        for other in others:
+        for other in shown:
             over = entry["over"].get(other)
             if over is None:
                 cells.append("-")
             else:
                 cells.append(f"{number(over['closest'])} ({number(over['least'])}), any {number(over['any_hit'])}")
-        body.append(cells + [number(entry["few_over_many"].get(tracer)) for tracer in OURS])
-    return table(columns, body)
+        body.append(cells)
+    return table(["mesh", "triangles", "calls", *shown], body)
 
 
-def _larger_and_outliers(rows: list[dict[str, Any]], tracers: list[str], threads: str) -> list[str]:
+def _scaling_table(rows: list[Row], tracers: list[str], threads: list[str]) -> list[str]:
+    if len(threads) == 1:
+        return []
+    measured = [(row["mesh"], form, few_over_many(row, form, threads)) for row in rows for form in FORMS]
+    shown = [tracer for tracer in tracers if any(tracer in ratios for _, _, ratios in measured)]
+    body = [[mesh, form, *(number(ratios.get(t)) for t in shown)] for mesh, form, ratios in measured if ratios]
+    lines = [f"Time with {threads[0]} thread over that with {threads[-1]}, median over kinds:", ""]
+    return lines + table(["mesh", "calls", *shown], body)
+
+
+def _larger_and_outliers(rows: list[Row], tracers: list[str], threads: str) -> list[str]:
     lines = []
     larger = larger_over_smaller(rows, tracers, threads)
     if larger:
@@ -103,7 +119,7 @@ def _larger_and_outliers(rows: list[dict[str, Any]], tracers: list[str], threads
     return lines
 
 
-def _rate_table(rows: list[dict[str, Any]], form: str, threads: str, tracers: list[str]) -> list[str]:
+def _rate_table(rows: list[Row], form: str, threads: str, tracers: list[str]) -> list[str]:
     body = []
     shown = [t for t in tracers if any(time_of(e, form, t, threads) for row in rows for e in row["kinds"].values())]
     for row in rows:
@@ -117,7 +133,7 @@ def _rate_table(rows: list[dict[str, Any]], form: str, threads: str, tracers: li
     return table(["mesh", "rays", "number", "hits, %", *shown], body)
 
 
-def _error_table(rows: list[dict[str, Any]]) -> list[str]:
+def _error_table(rows: list[Row]) -> list[str]:
     lines = [
         "Wrong hits and misses in percent of true hits, distances in texels of a 128 map, same triangle in percent of"
     ]
@@ -140,7 +156,7 @@ def _error_table(rows: list[dict[str, Any]]) -> list[str]:
     return lines + table([*columns, "ldt exact: p99, p99.9, same", "ldt: p99, p99.9, same"], body)
 
 
-def _old_table(rows: list[dict[str, Any]], threads: str) -> list[str]:
+def _old_table(rows: list[Row], threads: str) -> list[str]:
     """Milliseconds of the rays that a frame's mirror ball sends, in the order of earlier reports."""
     tracers = ["bvh", "embreex", "ldt exact", "ldt", "ldt fast", "ldt linear"]
     body = []
