@@ -1,8 +1,8 @@
 """Run time against error: layered depth textures, Warp's BVH and other people's ray tracers on the same rays.
 
 Everything is timed in turn in one process (A B A B ...), with compilation and a first round outside the clock; figures
-are medians, with the fastest and slowest beside them in the JSON. Threads are stated with every figure: with one, the
-whole process is kept to one core.
+are medians, with the fastest and slowest beside them in the JSON. Threads are stated with every figure; what cannot be
+told to use one (embreex's builds) is kept to one core.
 
     python tools/benchmark.py            # 25 minutes; writes tools/results/benchmark.json, .md and plots
     python tools/benchmark.py --quick    # one minute, small meshes, for the shape of the output
@@ -83,9 +83,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--tracers", type=names, default=[t.name for t in TRACERS], help="default: " + ALL_TRACERS)
     parser.add_argument("--threads", type=int, nargs="+", help="numbers of them; default: 1, and all cores")
     parser.add_argument("--rounds", type=int, help="that count, of each timing")
-    parser.add_argument(
-        "--fastest", action="store_true", help="report fastest rounds, where others use the machine, too"
-    )
+    parser.add_argument("--fastest", action="store_true", help="tables of fastest rounds: steadier on a busy machine")
     parser.add_argument("--rays", type=int, help="of each kind, about")
     parser.add_argument("-o", "--output", type=Path, help="folder to write to; default of a full run: tools/results")
     arguments = parser.parse_args()

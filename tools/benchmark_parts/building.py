@@ -14,7 +14,7 @@ from ldtrefl.device_scene import DeviceMesh
 from ldtrefl.ldt import peel_mesh
 from ldtrefl.raycast import Raycaster
 
-from .cores import threads
+from .cores import one_core
 from .models import Model
 from .ours import Caster, Exact, Fast, Linear, Peeled
 from .ray_tracer import RayTracer
@@ -41,14 +41,15 @@ def builds_of_mesh(
     makers = {
         name: functools.partial(make, geometry) for name, make in MAKERS.items() if name in [k.name for k in some]
     }
-    jobs: dict[tuple[str, str], Callable[[], Any]] = {("kernel", name): make for name, make in makers.items()}
-    for kind in some:
-        if kind.is_default:
-            jobs["numpy", kind.name] = functools.partial(kind, mesh.vertices, mesh.faces)
     found: dict[str, Any] = {}
     for count in counts:
-        with threads(count, some):
-            times = timed_in_turn({" ".join(key): job for key, job in jobs.items()}, rounds, MOST_SECONDS)
+        jobs: dict[tuple[str, str], Callable[[], Any]] = {("kernel", name): make for name, make in makers.items()}
+        for kind in some:
+            kind.set_threads(count)
+            if kind.is_default:
+                build = _on_one_core if count == 1 and kind.builds_on_all else _build
+                jobs["numpy", kind.name] = functools.partial(build, kind, mesh)
+        times = timed_in_turn({" ".join(key): job for key, job in jobs.items()}, rounds, MOST_SECONDS)
         found[str(count)] = {
             form: {name: times[f"{form} {name}"] for f, name in jobs if f == form} for form in ("numpy", "kernel")
         }
@@ -58,6 +59,15 @@ def builds_of_mesh(
         "milliseconds": found,
         "bytes": {name: make().nbytes for name, make in makers.items() if name != Caster.name},
     }
+
+
+def _build(kind: type[RayTracer], mesh: Model) -> RayTracer:
+    return kind(mesh.vertices, mesh.faces)
+
+
+def _on_one_core(kind: type[RayTracer], mesh: Model) -> RayTracer:
+    with one_core():
+        return _build(kind, mesh)
 
 
 def build_line(row: dict[str, Any]) -> str:

@@ -1,26 +1,21 @@
-"""One thread or all of them, for everybody alike."""
+"""The processor: its name, and how many of its cores are used."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
 
 ALL = os.sched_getaffinity(0)
 """Cores that this process may use."""
 
 
 @contextmanager
-def threads(count: int, tracers: Iterable[Any]) -> Iterator[None]:
-    """So many threads for each tracer's ``set_threads``; for one, the whole process is kept to one core, since some
-    (Embree's builds through embreex) cannot be told."""
-    for tracer in tracers:
-        tracer.set_threads(count)
+def one_core() -> Iterator[None]:
+    """The whole process on one core, for what cannot be told its number of threads."""
     try:
-        if count == 1:
-            _keep_to({max(ALL)})
+        _keep_to({max(ALL)})
         yield
     finally:
         _keep_to(ALL)

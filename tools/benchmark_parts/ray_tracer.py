@@ -22,6 +22,8 @@ class RayTracer:
     """Whether it is what its users get without options: then its public calls are timed, too."""
     has_threads: ClassVar[bool] = True
     """Whether tracing uses more than one."""
+    builds_on_all: ClassVar[bool] = False
+    """Whether building uses all cores, whatever ``set_threads`` says."""
     most_triangles: ClassVar[int] = 1 << 30
     """Left out above: memory for so many trees at a time."""
 

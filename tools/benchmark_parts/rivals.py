@@ -39,6 +39,7 @@ class Embreex(Rival):
 
     name = "embreex"
     has_threads = False
+    builds_on_all = True
     _scene: ModuleType
     _mesh: ModuleType
 

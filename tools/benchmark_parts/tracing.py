@@ -9,7 +9,7 @@ from typing import Any
 
 from timing import timed_in_turn
 
-from .cores import ALL, threads
+from .cores import ALL
 from .models import Model
 from .ours import Caster, Exact, Fast, Linear, Ours, Peeled
 from .ray_tracer import RayTracer
@@ -65,8 +65,9 @@ def _measured(mesh: Model, batch: Rays, built: Built, rounds: int, plan: Plan) -
         taking = {name: tracer for name, tracer in taking.items() if name not in (Fast.name, Linear.name)}
     milliseconds = {}
     for count in plan.threads:
-        with threads(count, taking.values()):
-            milliseconds[str(count)] = _times(batch, taking, count, rounds)
+        for tracer in taking.values():
+            tracer.set_threads(count)
+        milliseconds[str(count)] = _times(batch, taking, count, rounds)
     telling = {
         name: tracer for name, tracer in taking.items() if isinstance(tracer, Ours) or tracer.takes_arrays(batch)
     }
