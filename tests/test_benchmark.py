@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from benchmark_parts import ratios, report, rivals, tables
 from benchmark_parts.models import model
-from benchmark_parts.rays import RAYS, Rays, enters, kinds_of, second_bounce
+from benchmark_parts.rays import KINDS, RAYS, Rays, enters, kinds_of, second_bounce
 from benchmark_parts.rivals import Embreex, Rival, available
 from benchmark_parts.truth import EDGE, Model, errors_of, truth
 
@@ -27,6 +27,7 @@ def test_kinds_of_rays_are_what_they_say() -> None:
     hits = {kind: float((scene.hits(rays)[1] >= 0).mean()) for kind, rays in kinds.items()}
     assert 0.1 < hits["mirror, few hits"] < 0.3 < hits["mirror, many hits"] < 0.8
     assert enters(mesh.box, kinds["mirror, many hits"].origins, kinds["mirror, many hits"].directions).all()
+    assert set(kinds) == set(KINDS) - {"close-up"}
     assert {kind for kind, rays in kinds.items() if rays.any_hit} == {"shadow", "random, any hit"}
     for kind, rays in kinds.items():
         assert rays.origins.dtype == rays.directions.dtype == np.float32

@@ -5,8 +5,8 @@ are medians, with the fastest and slowest beside them in the JSON. Threads are s
 told to use one (embreex's builds) is kept to one core.
 
     python tools/benchmark.py            # 25 minutes; writes tools/results/benchmark.json, .md and plots
-    python tools/benchmark.py --quick    # one minute, small meshes, for the shape of the output
-    python tools/benchmark.py --only rays,build --meshes "lucy.ply,knot 96 k" --kinds "primary,shadow"
+    python tools/benchmark.py --quick    # one minute, small meshes, for the shape of the output, on the screen
+    python tools/benchmark.py --only rays,build --meshes "lucy.ply,knot 96 k" --kinds "primary;shadow"
                                          # a part of it: tables on the screen, files only where -o says
 
 Parts: rays, build, memory, frames (error against time, stages, error targets), threads, paper. Real meshes are taken
@@ -32,7 +32,7 @@ from benchmark_parts.memory import MEMORY_MESHES, memory_line, memory_of_mesh
 from benchmark_parts.models import OUTLIERS, every_name, model
 from benchmark_parts.ours import OURS
 from benchmark_parts.paper import paper_tables
-from benchmark_parts.rays import RAYS
+from benchmark_parts.rays import KINDS, RAYS
 from benchmark_parts.report import draw_plots, of_fastest, reading
 from benchmark_parts.rivals import RIVALS, available
 from benchmark_parts.threads import thread_scaling
@@ -89,13 +89,14 @@ def _arguments() -> argparse.Namespace:
     arguments = parser.parse_args()
     for what, given, allowed in (
         ("part", arguments.only, PARTS),
-        ("tracer", arguments.tracers, ALL_TRACERS.split(", ")),
+        ("tracer", arguments.tracers, [tracer.name for tracer in TRACERS]),
+        ("kind of rays", arguments.kinds, KINDS),
     ):
         for name in given:
             if name not in allowed:
-                parser.error(f"unknown {what} {name!r}, allowed are {', '.join(allowed)}")
+                parser.error(f"unknown {what} {name!r}, allowed are {'; '.join(allowed)}")
     is_whole = list(arguments.only) == list(PARTS) and not (arguments.meshes or arguments.kinds or arguments.threads)
-    is_whole = is_whole and len(arguments.tracers) == len(TRACERS)
+    is_whole = is_whole and len(arguments.tracers) == len(TRACERS) and not arguments.quick
     if arguments.output is None and is_whole:
         arguments.output = ROOT / "tools" / "results"
     return arguments

@@ -16,6 +16,18 @@ import numpy as np
 
 from .models import CITIES, Model
 
+KINDS = (
+    "primary",
+    "mirror, few hits",
+    "mirror, many hits",
+    "second bounce",
+    "random, from outside",
+    "random, from within",
+    "close-up",
+    "shadow",
+    "random, any hit",
+)
+
 RAYS = 100_000
 """About as many as each kind has."""
 

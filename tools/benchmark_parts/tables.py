@@ -42,13 +42,10 @@ def rays_tables(result: dict[str, Any]) -> list[str]:
         lines += [f"Threads: {count}.", "", *_ratio_table(rows, others, count)]
     lines += _scaling_table(rows, result["tracers"], threads)
     lines += _larger_and_outliers(rows, ["ldt", *others], threads[0])
-    slower = slower_than_bvh(rows, threads)
-    lines += [
-        "",
-        f"Rows where `bvh` is faster than `ldt`: {len(slower) or 'none'}.",
-        *(f"- {row}" for row in slower),
-        "",
-    ]
+    if {"ldt", "bvh"} <= set(result["tracers"]):
+        slower = slower_than_bvh(rows, threads)
+        lines += [f"Rows where `bvh` is faster than `ldt`: {len(slower) or 'none'}.", ""]
+        lines += [*(f"- {row}" for row in slower), ""]
     for form, label in FORMS.items():
         for count in threads:
             lines += [f"## Million rays a second: {label}, threads: {count}", ""]

@@ -46,7 +46,7 @@ def rays_on_mesh(mesh: Model, tracers: Sequence[type[RayTracer]], rounds: int, p
     judge = next(built[name] for name in JUDGES if name in built)
     measured = {}
     for batch in kinds_of(mesh, lambda o, d: judge.hits(Rays("", o, d)), plan.rays):
-        if not plan.kinds or batch.kind in plan.kinds:
+        if len(batch.origins) and (not plan.kinds or batch.kind in plan.kinds):
             measured[batch.kind] = _measured(mesh, batch, built, rounds, plan)
     return {"mesh": mesh.name, "triangles": len(mesh.faces), "kinds": measured}
 
