@@ -55,7 +55,13 @@ OUTLIER_TRACERS = ("ldt", "bvh", "embreex")
 def main() -> None:
     """Run the parts that are wanted and write JSON, Markdown and plots."""
     arguments = _arguments()
-    result = measured(arguments)
+    result: dict[str, Any] = {}
+    try:
+        measure(arguments, result)
+    except KeyboardInterrupt:
+        if not result:
+            raise
+        result["notes"].append("Stopped before its end.")
     report = reading(of_fastest(result) if arguments.fastest else result)
     if arguments.output is None:
         print(report)
@@ -102,8 +108,8 @@ def _arguments() -> argparse.Namespace:
     return arguments
 
 
-def measured(arguments: argparse.Namespace) -> dict[str, Any]:
-    """The figures of the parts that are wanted."""
+def measure(arguments: argparse.Namespace, result: dict[str, Any]) -> None:
+    """The figures of the parts that are wanted, into ``result`` one by one: what is done when stopped is not lost."""
     quick, wanted = arguments.quick, arguments.only
     rivals, notes = available(arguments.tracers)
     tracers = [*(kind for kind in OURS if kind.name in arguments.tracers), *rivals]
@@ -112,7 +118,7 @@ def measured(arguments: argparse.Namespace) -> dict[str, Any]:
     frame_rounds = arguments.rounds or (2 if quick else 9)
     threads = sorted(set(arguments.threads or (1, len(cores.ALL))))
     plan = Plan(threads, arguments.rays or (QUICK_RAYS if quick else RAYS), arguments.kinds)
-    result: dict[str, Any] = {
+    result |= {
         "machine": f"{cores.processor()}, Warp {wp.__version__}",
         "threads": threads,
         "tracers": [tracer.name for tracer in tracers],
@@ -140,15 +146,16 @@ def measured(arguments: argparse.Namespace) -> dict[str, Any]:
             result.setdefault("memory", []).append(memory_of_mesh(mesh, tracers))
             print(memory_line(result["memory"][-1]), flush=True)
     if "frames" in wanted:
-        result["error_against_time"] = error_against_time(quick, frame_rounds)
-        result["stages"] = frame_stages(quick, frame_rounds)
-        result["error_targets"] = error_targets(quick, frame_rounds)
+        result |= {
+            "error_against_time": error_against_time(quick, frame_rounds),
+            "stages": frame_stages(quick, frame_rounds),
+            "error_targets": error_targets(quick, frame_rounds),
+        }
     if "threads" in wanted:
         result["scaling"] = thread_scaling(quick, frame_rounds)
     if "paper" in wanted:
         result["paper"] = paper_tables(quick, frame_rounds)
     ldtrefl.set_threads()
-    return result
 
 
 if __name__ == "__main__":

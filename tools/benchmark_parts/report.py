@@ -89,6 +89,8 @@ def of_fastest(result: Any) -> Any:
 def reading(result: dict[str, Any]) -> str:
     """The figures of the parts that were run, as Markdown tables."""
     lines = ["# Benchmark", "", f"{result['machine']}; {result['statistic']} of things timed in turn.", ""]
+    if result["notes"]:
+        lines += [*(f"- {note}" for note in result["notes"]), ""]
     for part, tables in (
         ("rays", rays_tables),
         ("build", build_tables),

@@ -33,7 +33,6 @@ def rays_tables(result: dict[str, Any]) -> list[str]:
     rows, threads = result["rays"], [str(count) for count in result["threads"]]
     others = [name for name in result["tracers"] if not name.startswith("ldt")]
     lines = ["## Rivals over ours", ""]
-    lines += [f"- {note}" for note in result["notes"]]
     if not _has_occluded(rows):
         lines.append("- `occluded` of the public classes: not there; any-hit rays are timed by kernels alone.")
     lines += ["", "Time of the other over time of `ldt`: of closest hits the median over kinds of rays (the least), of"]
