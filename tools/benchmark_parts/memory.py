@@ -24,7 +24,7 @@ from .ours import Caster, Exact, Ours, Peeled
 from .ray_tracer import RayTracer
 from .rivals import RIVALS, Rival
 
-MEMORY_MESHES = ("knot 10 k", "knot 96 k", "knot 2 M", "knot 10 M", "lucy.ply", "lucy.ply loop 2 rough")
+MEMORY_MESHES = ("knot 10 k", "knot 96 k", "knot 2 M", "knot 10 M", "lucy.ply loop 2 rough")
 """Of a full run."""
 
 SMALL = "knot 1 k"

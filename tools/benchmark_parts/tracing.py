@@ -34,7 +34,7 @@ OLD_KIND = "mirror, few hits"
 JUDGES = (Embreex.name, Caster.name, Exact.name, Peeled.name)
 """Whose hits the rays of later bounces start from: the first that is there."""
 
-MOST_SECONDS = 8.0
+MOST_SECONDS = 5.0
 """For one kind of rays, on one number of threads: what is slow is timed in fewer rounds."""
 
 Built = dict[str, RayTracer]
