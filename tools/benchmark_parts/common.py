@@ -8,7 +8,7 @@ import warp as wp
 
 from ldtrefl import launch, skips
 from ldtrefl.scene import Camera, Light, Material, Object, Scene
-from ldtrefl.trace import Tracer, array_of_views, batch_kernel, occluded_of
+from ldtrefl.trace import Tracer, array_of_views, batch_kernel, block_of
 
 ROOT = Path(__file__).parent.parent.parent
 
@@ -30,63 +30,21 @@ class Batch:
         origins: wp.array,
         directions: wp.array,
         unit_frame: tuple[np.ndarray, float] = UNIT_SPACE,
+        *,
+        only_whether: bool = False,
     ) -> None:
-        n, device = origins.shape[0], origins.device
-        self.t, self.triangle = wp.empty(n, dtype=float, device=device), wp.empty(n, dtype=int, device=device)
-        outputs = [self.t, wp.empty(n, dtype=wp.vec3, device=device), self.triangle]
-        outputs += [wp.empty(n, dtype=wp.vec2, device=device), wp.zeros(n, dtype=wp.uint8, device=device)]
+        """Rays in the object space that has this ``unit_frame``; ``only_whether`` they meet anything, where asked."""
+        rays, device = origins.shape[0], origins.device
+        block = block_of(device)
+        items, told = -(-rays // block), 0 if only_whether else rays
+        self.t, self.triangle = wp.empty(told, dtype=float, device=device), wp.empty(rays, dtype=int, device=device)
+        outputs = [self.t, wp.empty(told, dtype=wp.vec3, device=device), self.triangle]
+        outputs += [wp.empty(told, dtype=wp.vec2, device=device), wp.empty(items, dtype=int, device=device)]
         self._view = view  # owns the arrays that the kernel's copy points to
         views = array_of_views([view], tracer.view, device)
-        self._arguments = [views, wp.vec3d(*unit_frame[0]), wp.float64(1.0 / unit_frame[1])]
-        self._arguments += [origins, directions, *outputs]
-        self._kernel, self._count, self._device = batch_kernel(tracer), n, device
-
-    def __call__(self) -> None:
-        launch.launch(self._kernel, self._count, self._arguments, self._device)
-
-
-@launch.once
-def any_hit_kernel(tracer: Tracer) -> wp.Kernel:
-    """The kernel that asks of rays, given in object space with unit directions, whether they meet anything."""
-    is_blocked = occluded_of(tracer)
-
-    @launch.kernel
-    def trace_any_hit(
-        first: int,
-        # In:
-        views: wp.array(dtype=tracer.view),
-        centre: wp.vec3d,
-        per_half: wp.float64,
-        origins: wp.array(dtype=wp.vec3),
-        directions: wp.array(dtype=wp.vec3),
-        # Out:
-        occluded_out: wp.array(dtype=wp.bool),
-    ):
-        i = first + wp.tid()
-        o = origins[i]
-        start = per_half * (wp.vec3d(wp.float64(o[0]), wp.float64(o[1]), wp.float64(o[2])) - centre)
-        occluded_out[i] = is_blocked(views, 0, start, directions[i], float(wp.inf), wp.vec3(0.0))
-
-    return trace_any_hit
-
-
-class AnyHitBatch:
-    """The same for any-hit queries."""
-
-    def __init__(
-        self,
-        tracer: Tracer,
-        view: Any,
-        origins: wp.array,
-        directions: wp.array,
-        unit_frame: tuple[np.ndarray, float] = UNIT_SPACE,
-    ) -> None:
-        self.occluded = wp.empty(origins.shape[0], dtype=wp.bool, device=origins.device)
-        self._view = view
-        views = array_of_views([view], tracer.view, origins.device)
-        self._arguments = [views, wp.vec3d(*unit_frame[0]), wp.float64(1.0 / unit_frame[1])]
-        self._arguments += [origins, directions, self.occluded]
-        self._kernel, self._count, self._device = any_hit_kernel(tracer), origins.shape[0], origins.device
+        self._arguments = [views, wp.vec3d(*unit_frame[0]), wp.float64(1.0 / unit_frame[1]), origins, directions]
+        self._arguments += [wp.empty(0, dtype=float, device=device), *outputs]
+        self._kernel, self._count, self._device = batch_kernel(tracer, block, only_whether), items, device
 
     def __call__(self) -> None:
         launch.launch(self._kernel, self._count, self._arguments, self._device)

@@ -14,7 +14,7 @@ from ldtrefl.march import TRACERS
 from ldtrefl.raycast import BVH
 from ldtrefl.trace import Tracer
 
-from .common import AnyHitBatch, Batch
+from .common import Batch
 from .ray_tracer import RayTracer
 from .rays import Rays
 from .rivals import MOST_TRIANGLES
@@ -34,30 +34,19 @@ class Ours(RayTracer):
         ldtrefl.set_threads(threads)
 
     def takes_arrays(self, rays: Rays) -> bool:
-        return self.is_default and (not rays.any_hit or hasattr(self.built, "occluded"))
+        return self.is_default
 
     def closest(self, rays: Rays) -> ldtrefl.Hits:
         return self.built.trace(rays.origins, rays.directions)
 
     def occluded(self, rays: Rays) -> np.ndarray:
-        if hasattr(self.built, "occluded"):
-            return np.asarray(self.built.occluded(rays.origins, rays.directions))
-        return self.any_hits(rays)
-
-    def any_hits(self, rays: Rays) -> np.ndarray:
-        """``occluded`` by the kernel alone."""
-        kernel = self._batch(AnyHitBatch, rays)
-        kernel()
-        return kernel.occluded.numpy()
+        return self.built.occluded(rays.origins, rays.directions)
 
     def prepared(self, rays: Rays) -> Callable[[], Any]:
         """The kernel over rays that lie in Warp's arrays."""
-        return self._batch(AnyHitBatch if rays.any_hit else Batch, rays)
-
-    def _batch(self, made: Any, rays: Rays) -> Any:
-        device = launch.resolve_device(None)
-        arrays = (wp.array(x, dtype=wp.vec3, device=device) for x in (rays.origins, rays.directions))
-        return made(self.tracer, self.view, *arrays, unit_frame=self.built.geometry.mesh.unit_frame)
+        device, unit_frame = launch.resolve_device(None), self.built.geometry.mesh.unit_frame
+        origins, directions = (wp.array(x, dtype=wp.vec3, device=device) for x in (rays.origins, rays.directions))
+        return Batch(self.tracer, self.view, origins, directions, unit_frame, only_whether=rays.any_hit)
 
     def hits(self, rays: Rays) -> tuple[np.ndarray, np.ndarray]:
         found = self.closest(rays)
@@ -88,6 +77,9 @@ class Peeled(Ours):
 
     def closest(self, rays: Rays) -> ldtrefl.Hits:
         return self.built.trace(rays.origins, rays.directions, search=self.search)
+
+    def occluded(self, rays: Rays) -> np.ndarray:
+        return self.built.occluded(rays.origins, rays.directions, search=self.search)
 
 
 class Exact(Peeled):

@@ -33,9 +33,7 @@ def rays_tables(result: dict[str, Any]) -> list[str]:
     rows, threads = result["rays"], [str(count) for count in result["threads"]]
     others = [name for name in result["tracers"] if not name.startswith("ldt")]
     lines = ["## Rivals over ours", ""]
-    if not _has_occluded(rows):
-        lines.append("- `occluded` of the public classes: not there; any-hit rays are timed by kernels alone.")
-    lines += ["", "Time of the other over time of `ldt`: of closest hits the median over kinds of rays (the least), of"]
+    lines += ["Time of the other over time of `ldt`: of closest hits the median over kinds of rays (the least), of"]
     lines += ["any-hit rays the least. Above 1, `ldt` is faster.", ""]
     for count in threads:
         lines += [f"Threads: {count}.", "", *_ratio_table(rows, others, count)]
@@ -50,16 +48,6 @@ def rays_tables(result: dict[str, Any]) -> list[str]:
             lines += [f"## Million rays a second: {label}, threads: {count}", ""]
             lines += _rate_table(rows, form, count, result["tracers"])
     return [*lines, "## Errors", "", *_error_table(rows), *_old_table(rows, threads[0])]
-
-
-def _has_occluded(rows: list[Row]) -> bool:
-    return any(
-        "ldt" in forms["numpy"]
-        for row in rows
-        for entry in row["kinds"].values()
-        if entry["any_hit"]
-        for forms in entry["milliseconds"].values()
-    )
 
 
 def _ratio_table(rows: list[Row], others: list[str], threads: str) -> list[str]:
