@@ -113,6 +113,8 @@ def test_errors_are_percent_of_true_hits_and_texels() -> None:
     wrong = errors_of(tuple(map(np.array, zip(*answer, strict=True))), right)  # type: ignore[arg-type]
     assert (wrong["wrong_hits"], wrong["wrong_misses"]) == (25.0, 25.0)
     assert wrong["p999"] == pytest.approx(1.0, rel=0.01)
+    rounded = 2.0 * (1.0 + 2e-7), 2
+    assert errors_of(tuple(map(np.array, zip(*[rounded] * 5, strict=True))), right)["p999"] == 0.0  # type: ignore[arg-type]
     assert wrong["same_triangle"] == pytest.approx(200 / 3)
 
 
