@@ -22,7 +22,7 @@ from ldtrefl.errors import InputError
 from ldtrefl.image import decoded_bytes
 from ldtrefl.mesh import Mesh
 from ldtrefl.scene import Camera, Light, Object, Scene
-from ldtrefl.strays import stray_array
+from ldtrefl.strays import strays_of
 
 MOST_NUMBERS = (1 << 31) - 1
 """Triangles and vertices of all objects together: they are numbered by int32."""
@@ -143,9 +143,9 @@ class DeviceMesh:
         """By ``id`` of the texture, which is kept beside."""
 
     @functools.cached_property
-    def strays(self) -> wp.array:
-        """(k,) ``StrayTriangle``."""
-        return stray_array(self.mesh, self.vertices.device)
+    def strays(self) -> Any:
+        """The mesh's ``Strays``."""
+        return strays_of(self.mesh, self.vertices.device)
 
     @functools.cached_property
     def exact_vertices(self) -> wp.array:

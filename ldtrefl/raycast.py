@@ -14,7 +14,7 @@ from ldtrefl import launch
 from ldtrefl.device_scene import DeviceMesh
 from ldtrefl.hit import Hit, no_hit
 from ldtrefl.mesh import Mesh
-from ldtrefl.strays import StrayTriangle, first_stray
+from ldtrefl.strays import Strays, first_stray
 from ldtrefl.trace import (
     Hits,
     Query,
@@ -34,7 +34,7 @@ class BvhView:
     """A mesh with its BVH."""
 
     mesh: wp.uint64  # without the strays
-    strays: wp.array(dtype=StrayTriangle)
+    strays: Strays
 
 
 @wp.func
@@ -76,7 +76,7 @@ def stray_hit_bvh(
 @wp.func
 def stray_count_bvh(views: wp.array(dtype=BvhView), index: int) -> int:
     """The tracer's ``stray_count``."""
-    return views[index].strays.shape[0]
+    return views[index].strays.triangles.shape[0]
 
 
 BVH = Tracer(

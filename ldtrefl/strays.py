@@ -1,16 +1,20 @@
-"""The few triangles far outside a mesh's bulk (``bulk.py``), in float64: tested one by one before the bulk is.
+"""The few triangles far outside a mesh's bulk (``bulk.py``), in float64: tested one by one.
 
 A corner a million sizes away is rounded by a tenth of a size in float32, and with it the plane where it passes the
-bulk. So these triangles keep the mesh's own float64 corners.
+bulk. So these triangles keep the mesh's own float64 corners. Boxes about them in float32, eight at a time, tell which a
+ray may meet.
 """
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 import warp as wp
 
 from ldtrefl.hit import Hit, no_hit
 from ldtrefl.mesh import Mesh
+from ldtrefl.native_sources import native_body
 from ldtrefl.vectors import as_double, as_single
 
 
@@ -24,43 +28,111 @@ class StrayTriangle:
     triangle: int
 
 
+@wp.struct
+class Strays:
+    """All of a mesh."""
+
+    triangles: wp.array(dtype=StrayTriangle)
+    boxes: wp.array(dtype=wp.float32)  # of eight each: per axis their lows, then their highs
+
+
+BOX_MARGIN = 1.0e-6
+"""Of the largest coordinate, by how much boxes, and a ray's start, are widened: some roundings of a float32."""
+NEGLIGIBLE = 1.0e-30
+"""Component of a direction below which the ray runs along the planes."""
+
+ENTERED = """
+    typedef Vectors V;
+    const float* box = boxes.data + 48 * group;
+    V::Eight in = V::eight(0.0f), out = V::eight(t_max);
+    const float x = (float)origin[0], y = (float)origin[1], z = (float)origin[2];
+    const float start[3] = {x, y, z};
+    const float margin = BOX_MARGIN * V::greater(V::greater(V::greater(x, -x), V::greater(y, -y)), V::greater(z, -z));
+    for (int k = 0; k < 3; ++k) {
+        float along = direction[k];
+        if (along < NEGLIGIBLE && along > -NEGLIGIBLE) along = along < 0.0f ? -NEGLIGIBLE : NEGLIGIBLE;
+        const V::Eight inverse = V::eight(1.0f / along);
+        const V::Eight a = (V::load(box + 16 * k) - V::eight(start[k] + margin)) * inverse;
+        const V::Eight b = (V::load(box + 16 * k + 8) - V::eight(start[k] - margin)) * inverse;
+        in = V::greater(V::lesser(a, b), in);
+        out = V::lesser(V::greater(a, b), out);
+    }
+    // Rounding of the products, which may be far from 0.
+    return V::bits(in <= out + V::eight(BOX_MARGIN) * V::greater(in, V::greater(out, -out)));
+"""
+
+
+@wp.func_native(native_body({"BOX_MARGIN": BOX_MARGIN, "NEGLIGIBLE": NEGLIGIBLE}, ("vectors.h",), ENTERED))
+def boxes_entered(
+    boxes: wp.array(dtype=wp.float32), group: int, origin: wp.vec3d, direction: wp.vec3, t_max: float
+) -> wp.int32:
+    """A bit for each of a group's eight boxes that a ray may enter."""
+    ...
+
+
 @wp.func
-def first_stray(strays: wp.array(dtype=StrayTriangle), origin: wp.vec3d, direction: wp.vec3, t_max: float) -> Hit:
-    """Test every triangle (Moeller and Trumbore 1997), from ``origin`` in unit space along a unit ``direction``."""
+def stray_hit(stray: StrayTriangle, origin: wp.vec3d, direction: wp.vec3, t_max: float) -> Hit:
+    """Test a triangle (Moeller and Trumbore 1997)."""
     hit = no_hit()
-    nearest = wp.float64(t_max)
     zero, one = wp.float64(0.0), wp.float64(1.0)
     way = as_double(direction)
-    for k in range(strays.shape[0]):
-        edge_u, edge_v = strays[k].edge_u, strays[k].edge_v
-        p = wp.cross(way, edge_v)
-        determinant = wp.dot(edge_u, p)
-        if determinant != zero:
-            s = origin - strays[k].a
-            u = wp.dot(s, p) / determinant
-            q = wp.cross(s, edge_u)
-            v = wp.dot(way, q) / determinant
-            t = wp.dot(edge_v, q) / determinant
-            if u >= zero and v >= zero and u + v <= one and t >= zero and t < nearest:
-                nearest = t
-                hit.t = float(t)
-                hit.triangle = strays[k].triangle
-                hit.u = float(u)
-                hit.v = float(v)
-                hit.normal = as_single(wp.normalize(wp.cross(edge_u, edge_v)))
+    edge_u, edge_v = stray.edge_u, stray.edge_v
+    p = wp.cross(way, edge_v)
+    determinant = wp.dot(edge_u, p)
+    if determinant != zero:
+        s = origin - stray.a
+        u = wp.dot(s, p) / determinant
+        q = wp.cross(s, edge_u)
+        v = wp.dot(way, q) / determinant
+        t = wp.dot(edge_v, q) / determinant
+        if u >= zero and v >= zero and u + v <= one and t >= zero and t < wp.float64(t_max):
+            hit.t = float(t)
+            hit.triangle = stray.triangle
+            hit.u = float(u)
+            hit.v = float(v)
+            hit.normal = as_single(wp.normalize(wp.cross(edge_u, edge_v)))
     return hit
 
 
-def stray_array(mesh: Mesh, device: wp.Device) -> wp.array:
-    """(k,) ``StrayTriangle`` of a mesh, on a device."""
+@wp.func
+def first_stray(strays: Strays, origin: wp.vec3d, direction: wp.vec3, t_max: float) -> Hit:
+    """What a ray meets first of them, from ``origin`` in unit space."""
+    hit = no_hit()
+    for group in range((strays.triangles.shape[0] + 7) / 8):
+        entered = boxes_entered(strays.boxes, group, origin, direction, t_max)
+        for k in range(8):
+            if (entered >> k) & 1 == 1 and 8 * group + k < strays.triangles.shape[0]:
+                nearest = t_max
+                if hit.triangle >= 0:
+                    nearest = hit.t
+                one = stray_hit(strays.triangles[8 * group + k], origin, direction, nearest)
+                if one.triangle >= 0:
+                    hit = one
+    return hit
+
+
+def strays_of(mesh: Mesh, device: wp.Device) -> Any:
+    """The ``Strays`` of a mesh, on a device."""
+    made = Strays()
     if len(mesh.strays) == 0:
-        return wp.empty(0, dtype=StrayTriangle, device=device)
+        made.triangles = wp.empty(0, dtype=StrayTriangle, device=device)
+        made.boxes = wp.empty(0, dtype=wp.float32, device=device)
+        return made
     centre, half = mesh.unit_frame
-    a, b, c = np.moveaxis((mesh.vertices[mesh.faces[mesh.strays]] - centre) / half, 1, 0)
-    made = []
+    corners = (mesh.vertices[mesh.faces[mesh.strays]] - centre) / half
+    a, b, c = np.moveaxis(corners, 1, 0)
+    records = []
     for k, triangle in enumerate(mesh.strays.tolist()):
         record = StrayTriangle()
         record.a, record.triangle = wp.vec3d(*a[k]), triangle
         record.edge_u, record.edge_v = wp.vec3d(*(b[k] - a[k])), wp.vec3d(*(c[k] - a[k]))
-        made.append(record)
-    return wp.array(made, dtype=StrayTriangle, device=device)
+        records.append(record)
+    made.triangles = wp.array(records, dtype=StrayTriangle, device=device)
+    boxes = np.zeros((-(-len(corners) // 8), 3, 2, 8), np.float32)
+    margin = BOX_MARGIN * np.abs(corners).max(axis=(1, 2))[:, None]
+    for side, bound in enumerate((corners.min(axis=1) - margin, corners.max(axis=1) + margin)):
+        padded = np.zeros((8 * len(boxes), 3))
+        padded[: len(bound)] = bound
+        boxes[:, :, side] = padded.reshape(-1, 8, 3).transpose(0, 2, 1)
+    made.boxes = wp.array(boxes.reshape(-1), dtype=wp.float32, device=device)
+    return made

@@ -22,7 +22,7 @@ import warp as wp
 
 from ldtrefl import warp_abi
 from ldtrefl.device_scene import DeviceMesh
-from ldtrefl.strays import StrayTriangle
+from ldtrefl.strays import Strays
 
 LANES = wp.constant(8)
 """Records in a block, and children of a node: the width of AVX2."""
@@ -61,7 +61,7 @@ class TreeView:
     in_turn: int  # 1: larger than a cache, so that rays that do not stay together are searched for in turn
     vertices: wp.array(dtype=wp.vec3)
     faces: wp.array(dtype=wp.vec3i)
-    strays: wp.array(dtype=StrayTriangle)  # what lies far outside, and not in the tree
+    strays: Strays  # what lies far outside, and not in the tree
 
 
 _ARRAYS = ("nodes", "rows")

@@ -229,7 +229,7 @@ def stray_hit_exact(
 @wp.func
 def stray_count_exact(views: wp.array(dtype=TreeView), index: int) -> int:
     """The tracer's ``stray_count``."""
-    return views[index].strays.shape[0]
+    return views[index].strays.triangles.shape[0]
 
 
 EXACT = Tracer(
