@@ -53,9 +53,16 @@ struct TreeAnswer : TreeWalk {
     SHARED float facing(const Answer& answer, const float* direction, float front) {
         return front * dot(answer.normal, direction) / sqrtf(dot(direction, direction));
     }
-    SHARED bool is_doubted(const Answer& answer, const float* direction, float front) {
+    SHARED bool is_doubted(const Tree& tree, const Answer& answer, const float* direction, float front) {
         const float back = facing(answer, direction, front);
-        return back > 0.0f && back < GRAZING;
+        return back > 0.0f && (back < GRAZING || is_own(tree, answer, direction, back));
+    }
+
+    // Whether a ray that meets a patch's back has only left the surface that the patch stands for: it starts beneath it
+    // by less than a patch may rise over its surface.
+    SHARED bool is_own(const Tree& tree, const Answer& answer, const float* direction, float back) {
+        const float rise = answer.t * back * sqrtf(dot(direction, direction));
+        return answer.u < 0.0f && rise < OWN_RISE * tree.half_patch;
     }
 
     // A ray that is in doubt. If it started inside, any other ray from there meets a back too: one is sent to see. If
@@ -65,17 +72,18 @@ struct TreeAnswer : TreeWalk {
         double behind = 0.0;  // t of where ``onwards`` begins
         Rays rays;
         int steps = 0;
-        for (int doubts = 0; doubts < MOST_DOUBTS && is_doubted(answer, query.direction, front); ++doubts) {
+        for (int doubts = 0; doubts < MOST_DOUBTS && is_doubted(tree, answer, query.direction, front); ++doubts) {
             for (int k = 0; k < 3; ++k) {
                 const int i = k == 2 ? 0 : k + 1, j = k == 0 ? 2 : k - 1;
                 probe.origin[k] = onwards.origin[k];
                 probe.direction[k] = query.direction[i] * answer.normal[j] - query.direction[j] * answer.normal[i];
             }
             probe.t_max = FAR;
-            if (finds(rays, tree, probe, steps) && facing(to(tree, rays, 0), probe.direction, front) > 0.0f) break;
+            const bool is_leaving = is_own(tree, answer, query.direction, facing(answer, query.direction, front));
+            if (!is_leaving && finds(rays, tree, probe, steps) && facing(to(tree, rays, 0), probe.direction, front) > 0.0f) break;
             // By more than t's rounding, so that it does go on.
             const float past = (float)(answer.t - behind);
-            const double passed = past + greater(horizon, T_ROUNDING * past);
+            const double passed = past + greater(is_leaving ? OWN_STEP * tree.half_patch : horizon, T_ROUNDING * past);
             behind += passed;
             for (int k = 0; k < 3; ++k) onwards.origin[k] += passed * (double)query.direction[k];
             onwards.t_max = (float)(query.t_max - behind);

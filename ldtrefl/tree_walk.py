@@ -58,8 +58,13 @@ OWN_PATCHES = wp.constant(2.0)
 """Sides of a patch from its start within which a ray may pass through patches of its own surface: a bent surface has
 left the plane of a patch by then."""
 
-OWN_STEP = wp.constant(1.0 / 16.0)
-"""Sides of a patch by which a search goes on behind such a patch."""
+OWN_STEP = 1.0 / 8.0
+"""Halves of a patch's side by which a search goes on behind a patch of the ray's own surface."""
+
+OWN_RISE = 0.02
+"""Halves of a patch's side by which a ray may start beneath a patch and pass through it: it has left the surface that
+the patch stands for and rises over. Of rays that start on a knot of 500,000 triangles 23% end at their own patches
+without this, 7% with it, and 0.1% with 0.1; but as much is lost of rays that do start inside, 0.01% and 0.12%."""
 
 
 CONSTANTS: dict[str, float | int] = {
@@ -72,6 +77,8 @@ CONSTANTS: dict[str, float | int] = {
     "MOST_DOUBTS": MOST_DOUBTS,
     "NEAR": NEAR,
     "NEGLIGIBLE": NEGLIGIBLE,
+    "OWN_RISE": OWN_RISE,
+    "OWN_STEP": OWN_STEP,
     "PACKET_SPREAD": PACKET_SPREAD,
     "RAY_BLOCK": RAY_BLOCK,
     "START_ROUNDING": START_ROUNDING,
@@ -103,7 +110,7 @@ SEARCH = """
         hit.t = INFINITY;
         if (own.met[lane] < 0) continue;
         TreeAnswer::Answer answer = TreeAnswer::to(tree, own, lane);
-        if (view.front != 0.0f && TreeAnswer::is_doubted(answer, asked[i].direction, view.front))
+        if (view.front != 0.0f && TreeAnswer::is_doubted(tree, answer, asked[i].direction, view.front))
             hit.steps += TreeAnswer::go_beyond(tree, asked[i], view.front, view.horizon, answer);
         hit.triangle = answer.triangle;
         if (answer.triangle < 0) continue;
@@ -211,7 +218,7 @@ def occluded_exact(views: wp.array(dtype=TreeView), index: int, query: Query, ou
             return False
         if passed + hits[0].t >= OWN_PATCHES * side or not is_own_surface(hits[0], query.direction, outwards):
             return True
-        passed += hits[0].t + OWN_STEP * side
+        passed += hits[0].t + OWN_STEP * views[index].half_patch
     queries[0].origin = point_along(query.origin, query.direction, passed)
     queries[0].t_max = query.t_max - passed
     any_hits_exact(views, index, queries, 1, hits)

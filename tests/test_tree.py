@@ -115,6 +115,20 @@ def test_patches_show_their_front(wound: str) -> None:
     assert back <= (1e-3 if wound == "open" else 1e-4), back
 
 
+def test_rays_that_leave_a_patched_surface_mostly_do() -> None:
+    """Patches rise a little over the surface that they stand for: a ray that starts there is beneath them."""
+    mesh = shapes.make("torus_knot", DENSE_KNOT)
+    maps, exact = (ldtrefl.peel(mesh.vertices, mesh.faces, quality=quality) for quality in ("balanced", "exact"))
+    origins, directions = rays_from_outside(60_000, 8)
+    hits = exact.trace(origins, directions)
+    met = hits.triangle >= 0
+    onwards = directions[met] - 2 * (directions[met] * hits.normal[met]).sum(axis=1, keepdims=True) * hits.normal[met]
+    starts = origins[met] + hits.t[met, None] * directions[met] + 1e-4 * hits.normal[met]
+    right, found = exact.trace(starts, onwards), maps.trace(starts, onwards)
+    is_early = found.t < right.t - 0.01 * np.linalg.norm(onwards, axis=1) ** -1
+    assert is_early.mean() <= 0.15 and (found.triangle >= 0).mean() > 0.2, is_early.mean()
+
+
 def test_patches_do_not_lose_what_is_thin_or_large() -> None:
     """A dense knot with wires far thinner than a texel and one large triangle: none of them may vanish."""
     knot, wires = shapes.make("torus_knot", DENSE_KNOT), shapes.make("wires", {"count": 3, "radius": 0.0004})
