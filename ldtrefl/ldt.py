@@ -5,11 +5,11 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import warp as wp
-from pydantic import BeforeValidator, Field, TypeAdapter, ValidationError
+from pydantic import BeforeValidator, Field, PlainValidator, TypeAdapter, ValidationError
 
 from ldtrefl import launch
 from ldtrefl.cache import Entry, current_cache, key_of
@@ -19,7 +19,7 @@ from ldtrefl.device_scene import DeviceMesh
 from ldtrefl.errors import InputError, first_fault, unknown_name
 from ldtrefl.files import written_whole
 from ldtrefl.fingerprint import fingerprint
-from ldtrefl.fragments import LdtView
+from ldtrefl.fragments import ONE_A_TEXEL, LdtView
 from ldtrefl.items import Quality, tree_of
 from ldtrefl.march import TRACERS
 from ldtrefl.mesh import Mesh
@@ -58,8 +58,10 @@ DEFAULT_RESOLUTION = 256
 DEFAULT_SEARCH = "exact"
 DEFAULT_QUALITY: Quality = "balanced"
 
-LINEAR_STEPS = 512
-"""Default of ``linear_steps``: about one a texel along the diagonal of a 256 map."""
+TEXEL: Literal["texel"] = "texel"
+"""The default of ``linear_steps``: one sample for each texel that the ray passes."""
+
+MOST_LINEAR_STEPS, MOST_BINARY_STEPS = 100_000, 64
 
 BINARY_STEPS = 8
 """Default of ``binary_steps``: a texel's step is halved to less than a hundredth."""
@@ -74,8 +76,36 @@ FEW_BACKS = 2
 Resolution = Annotated[int, BeforeValidator(plain), Field(strict=True, ge=FEWEST_TEXELS, le=MOST_TEXELS)]
 """The one definition for Python, methods and the command line."""
 
+
+def _linear_steps(value: Any) -> Any:
+    value = plain(value)
+    if value != TEXEL and (type(value) is not int or not 1 <= value <= MOST_LINEAR_STEPS):
+        raise ValueError(f"should be '{TEXEL}' or a whole number from 1 to {MOST_LINEAR_STEPS}, got {value!r:.60}")
+    return value
+
+
+LinearSteps = Annotated[int | Literal["texel"], PlainValidator(_linear_steps)]
+"""Samples of the linear search on a ray's way through the box: a number, or one for each texel passed (``march_linear.py``)."""
+
+BinarySteps = Annotated[int, BeforeValidator(plain), Field(strict=True, ge=0, le=MOST_BINARY_STEPS)]
+"""Bisections of the step that crosses a surface."""
+
 _RESOLUTION: TypeAdapter[int] = TypeAdapter(Resolution)
 _QUALITY = TypeAdapter(Quality)
+_LINEAR_STEPS: TypeAdapter[int | str] = TypeAdapter(LinearSteps)
+_BINARY_STEPS: TypeAdapter[int] = TypeAdapter(BinarySteps)
+
+
+def _checked(name: str, adapter: TypeAdapter[Any], value: Any) -> Any:
+    """``value`` as the adapter gives it.
+
+    Raises:
+        InputError: it is not allowed; the message names it.
+    """
+    try:
+        return adapter.validate_python(value)
+    except ValidationError as error:
+        raise first_fault(error, {}).within(name) from None
 
 
 class LayeredDepthTexture:
@@ -107,7 +137,7 @@ class LayeredDepthTexture:
     def _read_maps(self, entry: Entry) -> Maps:
         check_fragments(self.frame, len(self.geometry.faces), entry.arrays)
         check_order(entry.arrays)
-        return Maps.unpacked(entry.arrays, self.geometry.vertices.device)
+        return Maps.unpacked(self.frame, entry.arrays, self.geometry.vertices.device)
 
     def _make_maps(self) -> Maps:
         return sort_fragments(self.frame, self._rasteriser.fragments())
@@ -204,12 +234,12 @@ class LayeredDepthTexture:
         return {name: int(self.counts(axis).max(initial=0)) for axis, name in enumerate("xyz")}
 
     def view(
-        self, search: str = DEFAULT_SEARCH, *, linear_steps: int = LINEAR_STEPS, binary_steps: int = BINARY_STEPS
+        self, search: str = DEFAULT_SEARCH, *, linear_steps: LinearSteps = TEXEL, binary_steps: int = BINARY_STEPS
     ) -> Any:
         """What kernels read for a search: a ``TreeView`` for ``"exact"``, an ``LdtView`` for ``"linear"``.
 
         Raises:
-            InputError: an unknown search.
+            InputError: an unknown search, or a number of steps that is not allowed.
         """
         if search not in TRACERS:
             raise unknown_name("search", search, TRACERS)
@@ -217,13 +247,15 @@ class LayeredDepthTexture:
             return self.tree.view
         view = LdtView()
         view.start, view.depth, view.reference = self._maps.start, self._maps.depth, self._maps.reference
-        view.balanced = self._maps.balanced
+        self._maps.occupancy.show_in(view)
         view.size = wp.vec3i(*self.frame.size)
         view.first_texel = wp.vec3i(*self.frame.first_texels[:3])
         view.texels_per_unit = self.frame.scale
         view.texel_offset = wp.vec3(*self.frame.offset)
         view.vertices, view.faces = self.geometry.vertices, self.geometry.faces
-        view.linear_steps, view.binary_steps = linear_steps, binary_steps
+        steps = _checked("linear_steps", _LINEAR_STEPS, linear_steps)
+        view.linear_steps = ONE_A_TEXEL if steps == TEXEL else steps
+        view.binary_steps = _checked("binary_steps", _BINARY_STEPS, binary_steps)
         return view
 
     def trace(
@@ -233,7 +265,7 @@ class LayeredDepthTexture:
         t_max: Any = None,
         *,
         search: str = DEFAULT_SEARCH,
-        linear_steps: int = LINEAR_STEPS,
+        linear_steps: LinearSteps = TEXEL,
         binary_steps: int = BINARY_STEPS,
     ) -> Hits:
         """First hits of rays given in object space.
@@ -243,10 +275,12 @@ class LayeredDepthTexture:
             directions: (..., 3) float32, any length; ``t`` is in lengths of it.
             t_max: hits before this count; a number, or (...), one a ray; ``None``: all.
             search: ``"exact"``, a walk down the tree, or ``"linear"``, the paper's.
-            linear_steps, binary_steps: of the linear search.
+            linear_steps: of the linear search: ``"texel"``, one sample for each texel passed, or 1 to 100,000 samples.
+            binary_steps: of the linear search: 0 to 64 bisections.
 
         Raises:
-            InputError: shapes that do not fit, what is not a number, or an unknown search.
+            InputError: shapes that do not fit, what is not a number, an unknown search, or a number of steps that is not
+                allowed.
         """
         view = self.view(search, linear_steps=linear_steps, binary_steps=binary_steps)
         views = array_of_views([view], TRACERS[search].view, self.geometry.vertices.device)
@@ -259,7 +293,7 @@ class LayeredDepthTexture:
         t_max: Any = None,
         *,
         search: str = DEFAULT_SEARCH,
-        linear_steps: int = LINEAR_STEPS,
+        linear_steps: LinearSteps = TEXEL,
         binary_steps: int = BINARY_STEPS,
     ) -> Any:
         """(...) bool: whether rays meet the object at all; arguments and errors as :meth:`trace` has them."""
@@ -306,6 +340,7 @@ class LayeredDepthTexture:
             raise InputError(f"{path}: not a layered depth texture that can be read ({error})") from None
         loaded = cls(DeviceMesh(mesh, target), frame)
         loaded._maps = sorted_maps(
+            frame,
             wp.array(arrays["start"], dtype=wp.int32, device=target),
             wp.array(arrays["depth"], dtype=wp.float32, device=target),
             wp.array(arrays["reference"], dtype=wp.int32, device=target),
@@ -386,11 +421,8 @@ def peel_mesh(
     trusted: bool = False,
 ) -> LayeredDepthTexture:
     """:func:`peel` for a mesh that is on a device already; ``trusted`` if the resolution is finer than what is seen."""
-    for name, adapter, value in (("resolution", _RESOLUTION, resolution), ("quality", _QUALITY, quality)):
-        try:
-            adapter.validate_python(value)
-        except ValidationError as error:
-            raise first_fault(error, {}).within(name) from None
+    _checked("resolution", _RESOLUTION, resolution)
+    _checked("quality", _QUALITY, quality)
     maps = LayeredDepthTexture(geometry, texel_frame(geometry.mesh, int(resolution)), quality, trusted)
     maps.view(search)
     return maps

@@ -9,7 +9,15 @@ meshes are open, nested and seen from within:
   (open or inconsistently wound meshes) it is their parity. A ray that starts inside searches for the way out.
 - A crossing whose depth is far from the texel's (Fig. 5: the ray came in through the side of a column) is left to the
   other maps, and the search goes on.
-- The nearest crossing of the three maps wins, not the first map's.
+- The nearest crossing of the three maps wins, not the first map's: once a map has found one, the others search up to
+  there, with as many samples, or with one a texel, on the shorter way.
+
+Samples ``i = 1 .. n`` lie at ``t_enter + i * (t_exit - t_enter) / n``. ``n`` is ``linear_steps``, or with ``"texel"``
+one for each texel that the ray passes: the texels of that way along x, y and z together, rounded up, at least 1.
+
+Most samples are never looked at: ``march_linear.h`` goes from one that can matter to the next, by the fragments of a
+texel and by the cells that the maps agree about (``occupancy.py``). The answer has the same bits as if all were, and
+time follows what is near the ray, not the number of samples. ``steps`` counts the samples that were looked at.
 
 Limits: what is thinner than a step or lies between texel centres can be missed; silhouettes are blocks of a texel.
 """
@@ -18,9 +26,10 @@ from __future__ import annotations
 
 import warp as wp
 
-from ldtrefl.cubemap import texel_from_point
-from ldtrefl.fragments import LdtView, texel_number, triangle_of
+from ldtrefl.fragments import ONE_A_TEXEL, LdtView, triangle_of
 from ldtrefl.hit import Hit, no_hit
+from ldtrefl.native_sources import native_body
+from ldtrefl.occupancy import LEVEL_SHIFT
 from ldtrefl.shade import barycentrics_at
 from ldtrefl.trace import Query, Tracer, any_one_by_one, one_by_one
 from ldtrefl.unit_rays import NEAR, distance_passed
@@ -29,16 +38,33 @@ from ldtrefl.vectors import as_double, as_single, point_along
 BOX_MARGIN = wp.constant(0.01)
 """Texels by which the box is widened, so that surfaces on its sides lie inside it whatever the rounding."""
 
-CONSISTENT = wp.constant(1.0)
+CONSISTENT = 1.0
 """Texels between the ray and a fragment's depth within which a crossing is believed. Every surface faces one of the
 maps at 55 degrees or less, where its depth changes by little more than this from texel to texel. Measured on the test
 meshes, 2 gives more wrong hits in hollows and no fewer misses."""
 
-DEEP = wp.constant(2.0)
+DEEP = 2.0
 """Texels from every fragment beyond which the origin is inside the object for sure, not by a texel's error."""
 
 CLEARANCE = wp.constant(2.5)
 """Texels above its surface at which a ray starts that leaves it: a texel is a block, and in it a ray is inside."""
+
+
+SLACK = 2.0e-6
+"""Of the coordinates of a ray and its box, by how much less far a stretch is taken to reach: 32 roundings of a float32,
+where a sample's place is off by four and the number of a sample by as many."""
+
+SLOWEST = 1.0e-12
+"""Texels a sample: of a ray that is slower along an axis the number of samples to a texel would overflow."""
+
+NEVER = 1.0e9
+"""A number of a sample that no ray has."""
+
+ROUNDED_UP = 1.000001
+"""What lies before a limit by more than this lies before it whatever the rounding of a ray's last sample."""
+
+FEW = 8
+"""Fragments that are counted faster one by one than by halves."""
 
 
 @wp.struct
@@ -46,9 +72,8 @@ class Crossing:
     """A change between outside and inside, as one map sees it."""
 
     t: float
-    residual: float  # texels between the ray and the depth of the fragment, along the map's axis
-    fragment: int
-    steps: int
+    fragment: int  # -1 for none
+    steps: int  # samples looked at
 
 
 @wp.func
@@ -69,124 +94,102 @@ def box_span(size: wp.vec3i, origin: wp.vec3, direction: wp.vec3) -> wp.vec2:
     return wp.vec2(t_enter, t_exit)
 
 
-@wp.func
-def is_inside(view: LdtView, axis: int, rising: bool, p: wp.vec3) -> bool:
-    """Whether ``p`` is inside the object, going by the fragments of its texel."""
-    at = texel_from_point(axis, p)
-    texel = texel_number(view, axis, at[0], at[1])
-    first, end = view.start[texel], view.start[texel + 1]
-    k = int(first)
-    wound = int(0)
-    while k < end and view.depth[k] <= at[2]:
-        wound += 2 * (view.reference[k] & 1) - 1
-        k += 1
-    if view.balanced[texel] != wp.uint8(0):
-        return wound != 0
-    passed = end - k
-    if rising:
-        passed = k - first
-    return passed % 2 == 1
+CONSTANTS: dict[str, float | int] = {
+    "CONSISTENT": CONSISTENT,
+    "DEEP": DEEP,
+    "FEW": FEW,
+    "LEVEL_SHIFT": LEVEL_SHIFT,
+    "NEVER": NEVER,
+    "ONE_A_TEXEL": ONE_A_TEXEL,
+    "ROUNDED_UP": ROUNDED_UP,
+    "SLACK": SLACK,
+    "SLOWEST": SLOWEST,
+}
+FILES = ("march_linear.h",)
+"""What native functions here are made of."""
+
+SEARCH = """
+const auto& view = views.data[index];
+LinearSearch::Maps maps = {view.start.data, view.depth.data, view.inside.data};
+LinearSearch::Ray ray;
+int octant = 0;
+for (int axis = 0; axis < 3; ++axis) {
+    maps.size[axis] = view.size[axis];
+    maps.first_texel[axis] = view.first_texel[axis];
+    maps.first_column[axis] = view.first_column[axis];
+    ray.origin[axis] = origin[axis];
+    ray.direction[axis] = direction[axis];
+    octant += direction[axis] > 0.0f ? 0 : 1 << axis;
+}
+ray.t_enter = t_enter;
+maps.cells = (const LinearSearch::Word*)view.cells.data + (size_t)octant * view.words_per_octant;
+maps.cell_shift = view.cell_shift;
+maps.column_shift = view.column_shift;
+maps.levels = view.levels;
+int steps = 0;
+const LinearSearch::Crossing found =
+    LinearSearch::search(maps, ray, t_exit, t_max, any, view.linear_steps, view.binary_steps, steps);
+union Bits { int number; float bits; };
+const Bits fragment = {found.fragment}, looks = {steps};
+return {found.t, fragment.bits, looks.bits};
+"""
+"""The call into ``march_linear.h``."""
+
+
+@wp.func_native(native_body(CONSTANTS, FILES, SEARCH))
+def search_maps(
+    views: wp.array(dtype=LdtView),
+    index: int,
+    origin: wp.vec3,
+    direction: wp.vec3,
+    t_enter: float,
+    t_exit: float,
+    t_max: float,
+    any: bool,
+) -> wp.vec3:
+    """:func:`march_linear` in the box, in C++: the bits of a ``Crossing``, in the order of its fields."""
+    ...
 
 
 @wp.func
-def nearest_fragment(view: LdtView, axis: int, p: wp.vec3, best: Crossing) -> Crossing:
-    """``best``, or the fragment of the texel that holds ``p`` that is nearer in depth."""
-    at = texel_from_point(axis, p)
-    texel = texel_number(view, axis, at[0], at[1])
-    for k in range(view.start[texel], view.start[texel + 1]):
-        distance = wp.abs(view.depth[k] - at[2])
-        if distance < best.residual:
-            best.residual = distance
-            best.fragment = k
-    return best
+def march_linear(
+    views: wp.array(dtype=LdtView), index: int, origin: wp.vec3, direction: wp.vec3, t_max: float, any: bool
+) -> Crossing:
+    """The paper's search, in texel space: the nearest crossing that a map confirms, before ``t_max``; any that lies
+    before it, if ``any`` will do.
 
-
-@wp.func
-def no_crossing(t: float) -> Crossing:
-    """Nothing found yet."""
+    Its steps share out the ray's way through the box whatever ``t_max``, so what is met does not depend on it.
+    """
     crossing = Crossing()
-    crossing.t = t
-    crossing.residual = float(wp.inf)
+    crossing.t = float(wp.inf)
     crossing.fragment = -1
+    span = box_span(views[index].size, origin, direction)
+    if span[0] <= span[1] and span[0] < t_max:
+        found = search_maps(views, index, origin, direction, span[0], span[1], t_max, any)
+        crossing.steps = wp.cast(found[2], wp.int32)
+        if found[0] < t_max:
+            crossing.t = found[0]
+            crossing.fragment = wp.cast(found[1], wp.int32)
     return crossing
 
 
 @wp.func
-def search_map(
-    view: LdtView, axis: int, origin: wp.vec3, direction: wp.vec3, t_enter: float, t_exit: float
-) -> Crossing:
-    """Algorithm 1 of the paper in the map of one axis: linear search, then bisection."""
-    rising = direction[axis] > 0.0
-    inside = False
-    leaving_counts = True
-    if t_enter == 0.0:
-        # The ray starts in the box. A texel's error can put an origin on the surface inside the object: the way out
-        # is then no crossing. Deep inside (a room seen from within) it is.
-        inside = is_inside(view, axis, rising, origin)
-        if inside:
-            leaving_counts = nearest_fragment(view, axis, origin, no_crossing(0.0)).residual > DEEP
-    step = (t_exit - t_enter) / float(view.linear_steps)
-    i = int(1)
-    while i <= view.linear_steps:
-        t_after = t_enter + float(i) * step
-        if is_inside(view, axis, rising, origin + t_after * direction) != inside:
-            # Bisect between the last sample on the old side and the first on the new.
-            before, after = t_after - step, t_after
-            for _k in range(view.binary_steps):
-                middle = 0.5 * (before + after)
-                if is_inside(view, axis, rising, origin + middle * direction) != inside:
-                    after = middle
-                else:
-                    before = middle
-            if leaving_counts:
-                found = nearest_fragment(view, axis, origin + after * direction, no_crossing(after))
-                found = nearest_fragment(view, axis, origin + before * direction, found)
-                if found.residual <= CONSISTENT:
-                    found.steps = i
-                    return found
-            inside = not inside
-            leaving_counts = True
-        i += 1
-    nothing = no_crossing(float(wp.inf))
-    nothing.steps = view.linear_steps
-    return nothing
-
-
-@wp.func
-def march_linear(view: LdtView, origin: wp.vec3, direction: wp.vec3, t_max: float) -> Crossing:
-    """The paper's search, in texel space: the nearest crossing that a map confirms, before ``t_max``.
-
-    Its steps share out the ray's way through the box whatever ``t_max``, so what is met does not depend on it.
-    """
-    best = no_crossing(float(wp.inf))
-    steps = int(0)
-    span = box_span(view.size, origin, direction)
-    if span[0] <= span[1] and span[0] < t_max:
-        t_exit = span[1]
-        for axis in range(3):
-            if direction[axis] != 0.0:
-                found = search_map(view, axis, origin, direction, span[0], t_exit)
-                steps += found.steps
-                if found.fragment >= 0:
-                    best = found
-                    t_exit = found.t  # the other maps need look no farther
-        if best.t >= t_max:
-            best = no_crossing(float(wp.inf))
-    best.steps = steps
-    return best
+def distance_to_near(query: Query) -> float:
+    """How far a ray goes before it is near the object, where float32 does."""
+    if wp.max(wp.abs(query.origin)) > NEAR:
+        return distance_passed(query.origin, query.direction, NEAR)
+    return 0.0
 
 
 @wp.func
 def closest_hit_linear(views: wp.array(dtype=LdtView), index: int, query: Query) -> Hit:
     """The tracer's closest hit of a ray, by :func:`march_linear`."""
-    passed = float(0.0)
-    if wp.max(wp.abs(query.origin)) > NEAR:
-        passed = distance_passed(query.origin, query.direction, NEAR)
+    passed = distance_to_near(query)
     origin, direction = as_single(point_along(query.origin, query.direction, passed)), query.direction
     t_max = query.t_max - passed
     scale = views[index].texels_per_unit
     hit = no_hit()
-    found = march_linear(views[index], scale * origin + views[index].texel_offset, scale * direction, t_max)
+    found = march_linear(views, index, scale * origin + views[index].texel_offset, scale * direction, t_max, False)
     hit.steps = found.steps
     if found.fragment >= 0:
         hit.t = passed + found.t
@@ -204,9 +207,12 @@ def closest_hit_linear(views: wp.array(dtype=LdtView), index: int, query: Query)
 @wp.func
 def occluded_linear(views: wp.array(dtype=LdtView), index: int, query: Query, outwards: wp.vec3) -> bool:
     """The tracer's ``occluded`` by :func:`march_linear`."""
+    scale = views[index].texels_per_unit
     above = query
-    above.origin = query.origin + as_double((CLEARANCE / views[index].texels_per_unit) * outwards)
-    return closest_hit_linear(views, index, above).triangle >= 0
+    above.origin = query.origin + as_double((CLEARANCE / scale) * outwards)
+    passed = distance_to_near(above)
+    origin = scale * as_single(point_along(above.origin, above.direction, passed)) + views[index].texel_offset
+    return march_linear(views, index, origin, scale * above.direction, above.t_max - passed, True).fragment >= 0
 
 
 @wp.func

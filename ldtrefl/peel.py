@@ -24,6 +24,7 @@ from ldtrefl.budget import take
 from ldtrefl.cubemap import TexelFrame
 from ldtrefl.device_scene import DeviceMesh
 from ldtrefl.errors import InputError
+from ldtrefl.occupancy import Occupancy, occupancy_of
 from ldtrefl.raster import FixedTriangle, cover, fixed_triangle, interpolate, snap, unsnap
 
 INSERTION_LIMIT = wp.constant(24)
@@ -33,7 +34,7 @@ RUNS = 8192
 """Runs of triangles, at most, whose fragments are counted together: threads can share so many, and their sums take no
 time."""
 
-BYTES_PER_FRAGMENT = 24
+BYTES_PER_FRAGMENT = 25
 """What a fragment takes in the maps, and while they are made."""
 
 
@@ -245,15 +246,9 @@ def sort_texels(
     # In and out:
     depth: wp.array(dtype=wp.float32),
     reference: wp.array(dtype=wp.int32),
-    # Out:
-    balanced_out: wp.array(dtype=wp.uint8),
 ):
     texel = first + wp.tid()
     begin, end = start[texel], start[texel + 1]
-    rising = int(0)
-    for k in range(begin, end):
-        rising += reference[k] & 1
-    balanced_out[texel] = wp.uint8(wp.where(2 * rising == end - begin, 1, 0))
     if end - begin > INSERTION_LIMIT:
         heap_sort(depth, reference, begin, end)
     elif end - begin > 1:
@@ -319,25 +314,29 @@ class Maps:
     start: wp.array
     depth: wp.array
     reference: wp.array
-    balanced: wp.array
+    occupancy: Occupancy
+    """Derived from the others."""
 
     def packed(self) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
         """(arrays, nothing else) that :meth:`unpacked` makes the same maps from."""
-        return {name: array.numpy() for name, array in vars(self).items()}, {}
+        return {name: getattr(self, name).numpy() for name in ("start", "depth", "reference")}, {}
 
     @classmethod
-    def unpacked(cls, arrays: dict[str, np.ndarray], device: wp.Device) -> Maps:
+    def unpacked(cls, frame: TexelFrame, arrays: dict[str, np.ndarray], device: wp.Device) -> Maps:
         """Maps from what :meth:`packed` gave; on the CPU they share the arrays' memory.
 
         What comes from a file is checked first: :func:`check_fragments`, :func:`check_order`.
         """
-        dtypes = {"start": wp.int32, "depth": wp.float32, "reference": wp.int32, "balanced": wp.uint8}
-        return cls(**{k: wp.array(arrays[k], dtype=dtype, device=device, copy=False) for k, dtype in dtypes.items()})
+        dtypes = {"start": wp.int32, "depth": wp.float32, "reference": wp.int32}
+        start, depth, reference = (
+            wp.array(arrays[name], dtype=dtype, device=device, copy=False) for name, dtype in dtypes.items()
+        )
+        return cls(start, depth, reference, occupancy_of(frame, start, depth, reference))
 
     @property
     def nbytes(self) -> int:
-        """Bytes of the four arrays."""
-        return 4 * (self.start.size + self.depth.size + self.reference.size) + self.balanced.size
+        """Bytes of the maps and what they imply."""
+        return 4 * (self.start.size + self.depth.size + self.reference.size) + self.occupancy.nbytes
 
 
 def sort_fragments(frame: TexelFrame, raw: Fragments) -> Maps:
@@ -348,15 +347,13 @@ def sort_fragments(frame: TexelFrame, raw: Fragments) -> Maps:
     launch.launch(
         scatter_fragments, total, [raw.texel, start, ranks, raw.depth, raw.reference, depth, reference], device
     )
-    return sorted_maps(start, depth, reference)
+    return sorted_maps(frame, start, depth, reference)
 
 
-def sorted_maps(start: wp.array, depth: wp.array, reference: wp.array) -> Maps:
+def sorted_maps(frame: TexelFrame, start: wp.array, depth: wp.array, reference: wp.array) -> Maps:
     """Sort the fragments of each texel in place."""
-    texels = start.shape[0] - 1
-    balanced = wp.empty(texels, dtype=wp.uint8, device=start.device)
-    launch.launch(sort_texels, texels, [start, depth, reference, balanced], start.device)
-    return Maps(start, depth, reference, balanced)
+    launch.launch(sort_texels, start.shape[0] - 1, [start, depth, reference], start.device)
+    return Maps(start, depth, reference, occupancy_of(frame, start, depth, reference))
 
 
 def check_fragments(frame: TexelFrame, triangles: int, arrays: dict[str, np.ndarray]) -> None:
@@ -378,14 +375,12 @@ def check_fragments(frame: TexelFrame, triangles: int, arrays: dict[str, np.ndar
 
 
 def check_order(arrays: dict[str, np.ndarray]) -> None:
-    """Check that the fragments of each texel are sorted, and what is known of the texel, after the rest.
+    """Check that the fragments of each texel are sorted, after the rest.
 
     Raises:
         ValueError, KeyError: they are not.
     """
-    start, depth, balanced = (arrays[name] for name in ("start", "depth", "balanced"))
+    start, depth = arrays["start"], arrays["depth"]
     falls = np.flatnonzero(depth[1:] < depth[:-1]) + 1
     if not np.isin(falls, start).all():
         raise ValueError("fragments out of order")
-    if balanced.dtype != np.uint8 or balanced.shape != (start.size - 1,) or balanced.max(initial=0) > 1:
-        raise ValueError("texels that are not known")

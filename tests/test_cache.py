@@ -242,7 +242,7 @@ def test_maps_are_checked_in_every_field(cache: MapCache) -> None:
     arrays = entry.arrays
     check_fragments(frame, count, arrays)
     check_order(arrays)
-    start, depth, reference, balanced = (arrays[name] for name in ("start", "depth", "reference", "balanced"))
+    start, depth, reference = (arrays[name] for name in ("start", "depth", "reference"))
     two = int(np.flatnonzero(np.diff(start) > 1)[0])
     wrong = {
         "start": [
@@ -254,7 +254,6 @@ def test_maps_are_checked_in_every_field(cache: MapCache) -> None:
         ],
         "depth": [depth[:-1], changed(depth, 0, np.nan), depth.astype(np.float64), changed(depth, start[two], 1e9)],
         "reference": [reference[1:], changed(reference, 3, -1), changed(reference, 3, 2 * count)],
-        "balanced": [balanced[1:], balanced + 2, balanced.astype(np.int32)],
     }
     for name, others in wrong.items():
         for other in others:

@@ -56,6 +56,7 @@ BOTTOM_TO_TOP = (
     "cubemap",
     "raster",
     "fragments",
+    "occupancy",
     "peel",
     "pieces",
     "patches",

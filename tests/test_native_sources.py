@@ -12,7 +12,7 @@ import warp as wp
 from stress_cases.judge import rays_about
 
 import ldtrefl
-from ldtrefl import native_sources, shapes, tree_build, tree_walk
+from ldtrefl import march_linear, native_sources, shapes, tree_build, tree_walk
 from ldtrefl.hit import Hit
 from ldtrefl.trace import Query, array_of_views, trace_batch
 from ldtrefl.tree import TreeView
@@ -28,6 +28,7 @@ SHIM = """
 """What Warp's headers give native functions."""
 
 SOURCES = {
+    "march_linear.h": (march_linear.CONSTANTS, ()),
     "vectors.h": (tree_build.CONSTANTS, ()),
     "tree_build.h": (tree_build.CONSTANTS, ("vectors.h",)),
     "tree_walk.h": (tree_walk.CONSTANTS, ("vectors.h",)),

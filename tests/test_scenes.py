@@ -13,8 +13,8 @@ from ldtrefl import metrics
 from .conftest import SCENES
 
 SHIPPED = sorted(SCENES.glob("*.toml"))
-LINEAR_SSIM = 0.98
-"""What the paper's search reaches at 256 in every scene."""
+LINEAR_SSIM = 0.985
+"""What the paper's search reaches at 256, in every scene."""
 
 ALL = SHIPPED + sorted((SCENES / "paper").glob("*.toml"))
 

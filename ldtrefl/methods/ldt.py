@@ -31,8 +31,10 @@ from ldtrefl.ldt import (
     DEFAULT_QUALITY,
     DEFAULT_RESOLUTION,
     FEWEST_TEXELS,
-    LINEAR_STEPS,
+    TEXEL,
+    BinarySteps,
     LayeredDepthTexture,
+    LinearSteps,
     Resolution,
     peel_mesh,
 )
@@ -72,9 +74,9 @@ class Ldt(Method):
         """How a ray is searched for: exact (down a tree over the surface), linear (the paper's)."""
         quality: Quality = DEFAULT_QUALITY
         """Of the exact search: exact (every triangle), balanced (texels where triangles are finer), fast (texels)."""
-        linear_steps: Annotated[int, Field(strict=True, ge=1, le=100_000)] = LINEAR_STEPS
-        """Steps of the linear search through an object's box."""
-        binary_steps: Annotated[int, Field(strict=True, ge=0, le=64)] = BINARY_STEPS
+        linear_steps: LinearSteps = TEXEL
+        """Samples of the linear search through an object's box: texel (one for each texel passed), or 1 to 100,000."""
+        binary_steps: BinarySteps = BINARY_STEPS
         """Bisections of the step that crosses a surface."""
         cull: CullTest = "safe"
         """Reflection regions: safe (loses nothing), flat (the paper's, for flat mirror triangles)."""
