@@ -7,8 +7,8 @@ The pipeline, one module a stage:
       -> G-buffer: what the camera sees (gbuffer, zbuffer, raster)
       -> a method (methods/): its tracer answers reflected rays (trace), whose life is written once (reflect)
            ldt: cull (cull), as fine as needed (resolution), peel on first need (ldt: peel -> fragments -> occupancy;
-                items: patches, doubts -> tree_build -> tree; kept by cache, checked by tree_check), search (march: tree_walk,
-                march_linear)
+                items: patches, doubts -> tree_build -> tree; kept by cache, checked by tree_check), search (march:
+                tree_walk, march_linear)
            bvh: the ground truth (raycast)
       -> what stays from frame to frame (kept); what may be left out (skips)
       -> shade, the same functions for all (shade) -> composite (render) -> image (image), compared (metrics)

@@ -85,7 +85,7 @@ def _linear_steps(value: Any) -> Any:
 
 
 LinearSteps = Annotated[int | Literal["texel"], PlainValidator(_linear_steps)]
-"""Samples of the linear search on a ray's way through the box: a number, or one for each texel passed (``march_linear.py``)."""
+"""Samples of the linear search on a ray's way through the box: so many, or one for each texel (``march_linear.py``)."""
 
 BinarySteps = Annotated[int, BeforeValidator(plain), Field(strict=True, ge=0, le=MOST_BINARY_STEPS)]
 """Bisections of the step that crosses a surface."""
@@ -279,8 +279,8 @@ class LayeredDepthTexture:
             binary_steps: of the linear search: 0 to 64 bisections.
 
         Raises:
-            InputError: shapes that do not fit, what is not a number, an unknown search, or a number of steps that is not
-                allowed.
+            InputError: shapes that do not fit, what is not a number, an unknown search, or a number of steps that is
+                not allowed.
         """
         view = self.view(search, linear_steps=linear_steps, binary_steps=binary_steps)
         views = array_of_views([view], TRACERS[search].view, self.geometry.vertices.device)

@@ -137,31 +137,48 @@ def mark_rows(
 
 
 @launch.kernel
-def fill_columns(
+def turn_rows(
     first: int,
     # In:
-    along_x: wp.array2d(dtype=wp.uint64),
-    along_y: wp.array2d(dtype=wp.uint64),
-    along_z: wp.array2d(dtype=wp.uint64),
+    axis: int,  # 0 or 1
+    rows: wp.array2d(dtype=wp.uint64),
     side: int,
+    # Out: columns along z, by way, y and x
+    columns_out: wp.array2d(dtype=wp.uint64),
+):
+    item = first + wp.tid()
+    number = item / 2
+    kind = item % 2
+    way, x, y = number / (side * side), number % side, number / side % side
+    # A row along x has its places by (y, z), one along y by (z, x).
+    row, step, bit = way * side * side + y, side, x
+    if axis == 1:
+        row, step, bit = way * side * side + x * side, int(1), y
+    word = wp.uint64(0)
+    for z in range(side):
+        word |= ((rows[row + z * step, kind] >> wp.uint64(bit)) & wp.uint64(1)) << wp.uint64(z)
+    columns_out[number, kind] = word
+
+
+@launch.kernel
+def fill_columns(
+    first: int,
+    # In: columns along z that the three maps know, by way, y and x
+    from_x: wp.array2d(dtype=wp.uint64),
+    from_y: wp.array2d(dtype=wp.uint64),
+    from_z: wp.array2d(dtype=wp.uint64),
+    count: int,  # of columns
     columns_per_octant: int,
     # Out:
     cells_out: wp.array2d(dtype=wp.uint64),
 ):
-    # Turn the rows along x and y into columns along z, and join the three.
     item = first + wp.tid()
     number = item / 2
     kind = item % 2
-    count = side * side
     octant, column = number / count, number % count
-    x, y = column % side, column / side
-    place_x, place_y, place_z = (octant % 2) * count, (octant / 2 % 2) * count, (octant / 4) * count
-    word = along_z[place_z + column, kind]
-    for z in range(side):
-        across = (along_x[place_x + z * side + y, kind] >> wp.uint64(x)) | (
-            along_y[place_y + x * side + z, kind] >> wp.uint64(y)
-        )
-        word |= (across & wp.uint64(1)) << wp.uint64(z)
+    word = from_x[(octant & 1) * count + column, kind]
+    word |= from_y[((octant >> 1) & 1) * count + column, kind]
+    word |= from_z[(octant >> 2) * count + column, kind]
     cells_out[octant * columns_per_octant + column, kind] = word
 
 
@@ -236,14 +253,21 @@ def occupancy_of(frame: TexelFrame, start: wp.array, depth: wp.array, reference:
     cells.cell_shift = max(SMALLEST_SHIFT, log2_up(-(-longest // MOST_CELLS)))
     column_shift = log2_up(-(-longest // (1 << cells.cell_shift)))
     side = cells.side = 1 << column_shift
-    rows = [wp.empty((2 * side * side, 2), dtype=wp.uint64, device=device) for _ in range(3)]
+    ways = 2 if octants > 1 else 1
+    known = []
     for axis in range(3):
-        launch.launch(mark_rows, 2 * side * side, [axis, start, depth, inside, cells, rows[axis]], device)
+        rows = wp.empty((ways * side * side, 2), dtype=wp.uint64, device=device)
+        launch.launch(mark_rows, ways * side * side, [axis, start, depth, inside, cells, rows], device)
+        columns = rows
+        if axis < 2:
+            columns = wp.empty_like(rows)
+            launch.launch(turn_rows, 2 * ways * side * side, [axis, rows, side, columns], device)
+        known.append(columns)
 
     sides = tuple(side >> (LEVEL_SHIFT * level) for level in range(max(1, (column_shift + 1) // LEVEL_SHIFT)))
     count = sum(n * n for n in sides)
     made = wp.empty((octants * count, 2), dtype=wp.uint64, device=device)
-    launch.launch(fill_columns, 2 * octants * side * side, [*rows, side, count, made], device)
+    launch.launch(fill_columns, 2 * octants * side * side, [*known, side * side, count, made], device)
     below = 0
     for finer, n in itertools.pairwise(sides):
         above = below + finer * finer
