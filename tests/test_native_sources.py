@@ -1,4 +1,4 @@
-"""The C++ of native functions: it compiles alone, with vectors and without, answers the same, leaves no macro behind."""
+"""The C++ of native functions: files compile alone, with vectors and without, answer alike, leave no macro behind."""
 
 import dataclasses
 import re
