@@ -169,7 +169,7 @@ struct TreeWalk : Vectors {
     // Woop, Benthin and Wald 2013, "Watertight Ray/Triangle Intersection": in coordinates in which the ray is the third
     // axis, the signs of three areas. Two triangles compute the same for an edge that they share, but for the sign; a
     // ray through the edge, or so near that the area is 0, meets both.
-    SHARED bool meet_triangles(const float* rows, int row, Rays& rays, int ray) {
+    SHARED bool meet_triangles(const float* rows, int row, Rays& rays, int ray, bool any) {
         const float* a = rows + (size_t)row * LANES;
         const float* b = a + 3 * LANES;
         const float* c = b + 3 * LANES;
@@ -190,9 +190,13 @@ struct TreeWalk : Vectors {
         const Eight scale = eight(rays.shear[2][ray]), slack = eight(DEPTH_SLACK);
         const Eight a_t = az * scale, b_t = bz * scale, c_t = cz * scale;
         const Eight first = lesser(lesser(a_t, b_t), c_t) - slack, last = greater(greater(a_t, b_t), c_t) + slack;
-        const EightFlags is_ahead = (first <= eight(rays.nearest[ray])) & (last >= none) & (u + v + w != none);
+        const EightFlags is_some = inside & (u + v + w != none);
+        if (any && bits(is_some & (first >= slack) & (last < eight(rays.nearest[ray]) - slack))) {
+            rays.met[ray] = 0;
+            return true;
+        }
         bool is_met = false;
-        for (int lanes = bits(inside & is_ahead); lanes; lanes &= lanes - 1)
+        for (int lanes = bits(is_some & (first <= eight(rays.nearest[ray])) & (last >= none)); lanes; lanes &= lanes - 1)
             is_met |= meet_triangle(rows, LANES * row + lowest_bit(lanes), rays, ray);
         return is_met;
     }
@@ -291,9 +295,10 @@ struct TreeWalk : Vectors {
         return true;
     }
 
-    SHARED bool meet(const Tree& tree, int child, Rays& rays, int ray) {
+    SHARED bool meet(const Tree& tree, int child, Rays& rays, int ray, bool any) {
         const int row = ~child >> 1;
-        return ~child & 1 ? meet_patches(tree.rows, row, rays, ray, tree.half_patch) : meet_triangles(tree.rows, row, rays, ray);
+        if (~child & 1) return meet_patches(tree.rows, row, rays, ray, tree.half_patch);
+        return meet_triangles(tree.rows, row, rays, ray, any);
     }
 
     // Have memory bring what a ray will come to.
@@ -386,7 +391,7 @@ struct TreeWalk : Vectors {
                 if (!set) break;
                 child = any ? any_child(node, entry, set, stack, top) : nearest_child(tree, node, entry, set, stack, top);
             }
-            if (child < 0 && meet(tree, child, rays, ray) && any) return;
+            if (child < 0 && meet(tree, child, rays, ray, any) && any) return;
         } while (comes_back(rays.nearest[ray], stack, top, child));
     }
     OUT_OF_LINE void find_nearest(const Tree& tree, Rays& rays, int ray, int child) {
@@ -489,7 +494,7 @@ struct TreeWalk : Vectors {
             } else {
                 for (; live; live &= live - 1) {
                     const int ray = lowest_bit(live);
-                    if (child < 0) meet(tree, child, rays, ray);
+                    if (child < 0) meet(tree, child, rays, ray, any);
                     else if (any) find_any(tree, rays, ray, child);
                     else find_nearest(tree, rays, ray, child);
                     packet.nearest[ray] = any && rays.met[ray] >= 0 ? -1.0f : rays.nearest[ray];
@@ -532,7 +537,7 @@ struct TreeWalk : Vectors {
                     if (set && any) walker.child = any_child(node, entry, set, walker.stack, walker.top);
                     else if (set) walker.child = nearest_child(tree, node, entry, set, walker.stack, walker.top);
                 } else {
-                    is_done = meet(tree, walker.child, own, ray) && any;
+                    is_done = meet(tree, walker.child, own, ray, any) && any;
                 }
                 if (!is_done && !comes_farther) is_done = !comes_back(own.nearest[ray], walker.stack, walker.top, walker.child);
                 if (is_done && next < count) {

@@ -33,8 +33,9 @@ EDGE_ON = 2.0e-7
 DEPTH_SLACK = 1.0e-6
 """Unit space: rounding of how far along a ray a corner lies, with some to spare."""
 
-START_ROUNDING = 1.2e-7
-"""Unit space: how far behind its start a ray still meets what it starts on, for the rounding of a float32 start."""
+START_ROUNDING = 3.1e-8
+"""Unit space: how far behind its start a ray still meets what it starts on, half a unit in
+the last place of a float32 coordinate up to 1."""
 
 PACKET_SPREAD = 0.25
 """Unit space: how far the starts, and the directions, of the rays of a packet may lie apart along an axis."""
