@@ -59,7 +59,7 @@ DEFAULT_SEARCH = "exact"
 DEFAULT_QUALITY: Quality = "balanced"
 
 TEXEL: Literal["texel"] = "texel"
-"""The default of ``linear_steps``: one sample for each texel that the ray passes."""
+"""The default of ``linear_steps``: one sample for each texel that the ray passes, and no fewer than ``resolution``."""
 
 MOST_LINEAR_STEPS, MOST_BINARY_STEPS = 100_000, 64
 

@@ -155,7 +155,8 @@ struct LinearSearch {
         return cell == ray.end[axis] >> shift ? NEVER : out;
     }
 
-    // Share out the ray's way from t_enter to t_exit among so many samples, or one for each texel passed.
+    // Share out the ray's way from t_enter to t_exit among so many samples; or one for each texel passed, and no fewer than
+    // texels lie along the longest side: a flat object is passed within a few.
     SHARED void sample_until(Ray& ray, const Maps& maps, float t_exit, int steps) {
         UNFUSED
         const float* d = ray.direction;
@@ -163,7 +164,8 @@ struct LinearSearch {
         if (steps == ONE_A_TEXEL) {
             const float texels = (t_exit - ray.t_enter) * (size_of(d[0]) + size_of(d[1]) + size_of(d[2]));
             last = (float)(int)texels;
-            last = greater(last < texels ? last + 1.0f : last, 1.0f);
+            last = last < texels ? last + 1.0f : last;
+            for (int axis = 0; axis < 3; ++axis) last = greater((float)maps.size[axis], last);
         }
         ray.last = last;
         ray.step = (t_exit - ray.t_enter) / last;

@@ -13,7 +13,8 @@ meshes are open, nested and seen from within:
   there, with as many samples, or with one a texel, on the shorter way.
 
 Samples ``i = 1 .. n`` lie at ``t_enter + i * (t_exit - t_enter) / n``. ``n`` is ``linear_steps``, or with ``"texel"``
-one for each texel that the ray passes: the texels of that way along x, y and z together, rounded up, at least 1.
+one for each texel that the ray passes: the texels of that way along x, y and z together, rounded up, and at least as
+many as lie along the longest side.
 
 Most samples are never looked at: ``march_linear.h`` goes from one that can matter to the next, by the fragments of a
 texel and by the cells that the maps agree about (``occupancy.py``). The answer has the same bits as if all were, and

@@ -64,7 +64,7 @@ class LinearReference:
         if self.linear_steps != "texel":
             return int(self.linear_steps)
         x, y, z = np.abs(direction)
-        return max(1, int(np.ceil((t_exit - t_enter) * (x + y + z))))
+        return max(*self.size, int(np.ceil((t_exit - t_enter) * (x + y + z))))
 
     def _texels(self, axis: int, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """First fragments and ends of the texels that hold (n, 3) points."""
