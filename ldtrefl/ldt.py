@@ -20,11 +20,12 @@ from ldtrefl.errors import InputError, first_fault, unknown_name
 from ldtrefl.files import written_whole
 from ldtrefl.fingerprint import fingerprint
 from ldtrefl.fragments import ONE_A_TEXEL, LdtView
-from ldtrefl.items import Quality, tree_of
+from ldtrefl.items import tree_of
 from ldtrefl.march import TRACERS
 from ldtrefl.mesh import Mesh
 from ldtrefl.npz import read_arrays
 from ldtrefl.peel import Maps, Rasteriser, check_fragments, check_order, sort_fragments, sorted_maps
+from ldtrefl.records_choice import Quality
 from ldtrefl.trace import Hits, array_of_views, occluded_batch, trace_batch, trace_in_unit_space
 from ldtrefl.tree import Tree
 from ldtrefl.tree_check import check_tree

@@ -282,7 +282,7 @@ def test_a_crafted_file_is_made_anew(cache: MapCache, caplog: pytest.LogCaptureF
 
 
 @pytest.mark.parametrize(
-    "module", ["items", "patches", "pieces", "doubts", "raster", "tree_build", "tree_walk", "tree"]
+    "module", ["records_choice", "patches", "pieces", "doubts", "raster", "tree_build", "tree_walk", "tree"]
 )
 def test_every_constant_is_part_of_the_key(module: str, monkeypatch: pytest.MonkeyPatch) -> None:
     before = fingerprint("ldt")

@@ -61,6 +61,7 @@ BOTTOM_TO_TOP = (
     "pieces",
     "patches",
     "doubts",
+    "records_choice",
     "tree",
     "tree_check",
     "tree_build",

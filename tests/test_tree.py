@@ -19,7 +19,8 @@ DENSE_KNOT = {"segments": [2000, 125]}
 
 
 def differences(mesh: ldtrefl.Mesh, maps: LayeredDepthTexture, count: int, seed: int) -> dict[str, float]:
-    """Wrong hits and misses in percent of true hits, same triangle in percent of common hits, p99 in texels of 128."""
+    """Wrong hits and misses in percent of true hits, same triangle in percent of common hits, and the 99th and 99.9th
+    percentile of the distance in texels of 128."""
     origins, directions = rays_about(mesh, count, seed)
     hits = maps.trace(origins, directions)
     truth = ldtrefl.Raycaster(mesh.vertices, mesh.faces).trace(origins, directions)
@@ -31,6 +32,7 @@ def differences(mesh: ldtrefl.Mesh, maps: LayeredDepthTexture, count: int, seed:
         "wrong_misses": 100.0 * (true_hit & ~hit).sum() / true_hit.sum(),
         "same": 100.0 * (hits.triangle == truth.triangle)[both].mean(),
         "p99": float(np.percentile(np.abs(hits.t[both] - truth.t[both]), 99)) / texel,
+        "p999": float(np.percentile(np.abs(hits.t[both] - truth.t[both]), 99.9)) / texel,
     }
 
 
@@ -44,12 +46,12 @@ def test_exact_finds_what_the_raycaster_finds(mesh_or_shape: Callable, name: str
 
 
 @pytest.mark.parametrize(
-    ("quality", "wrong_hits", "wrong_misses", "p99"), [("balanced", 0.2, 0.05, 0.2), ("fast", 1.2, 0.3, 1.0)]
+    ("quality", "wrong_hits", "wrong_misses", "p99"), [("balanced", 0.1, 0.05, 0.1), ("fast", 0.6, 0.2, 0.5)]
 )
 def test_dense_meshes_become_patches(quality: str, wrong_hits: float, wrong_misses: float, p99: float) -> None:
     mesh = shapes.make("torus_knot", DENSE_KNOT)
     maps = ldtrefl.peel(mesh.vertices, mesh.faces, quality=quality)
-    assert maps.tree.patches and maps.nbytes < 16_000_000
+    assert maps.tree.patches and maps.nbytes < 4_000_000
     found = differences(mesh, maps, 60_000, 6)
     assert found["wrong_hits"] <= wrong_hits, found
     assert found["wrong_misses"] <= wrong_misses, found
@@ -64,12 +66,12 @@ def rough_ball(rise: float) -> ldtrefl.Mesh:
     return ldtrefl.Mesh(ball.vertices * rises[number.ravel()], ball.faces)
 
 
-def many_triangled_box() -> ldtrefl.Mesh:
-    """A turned box, each side of 131,072 triangles."""
+def many_triangled_box(axis: tuple[float, float, float]) -> ldtrefl.Mesh:
+    """A box turned about an axis, each side of 131,072 triangles."""
     box = trimesh.creation.box(extents=(1.0, 1.5, 2.0))
     for _ in range(8):
         box = box.subdivide()
-    turned = trimesh.transformations.rotation_matrix(0.7, (1, 2, 3))[:3, :3]
+    turned = trimesh.transformations.rotation_matrix(0.7, axis)[:3, :3]
     return ldtrefl.Mesh(box.vertices @ turned.T, box.faces)
 
 
@@ -84,13 +86,15 @@ def test_rough_surfaces_stay_triangles(quality: str) -> None:
     assert found["wrong_hits"] + found["wrong_misses"] <= 0.01 and found["p99"] < 0.01, found
 
 
-@pytest.mark.parametrize(("quality", "wrong"), [("balanced", 0.2), ("fast", 1.5)])
-def test_patches_end_at_edges(quality: str, wrong: float) -> None:
-    mesh = many_triangled_box()
-    maps = ldtrefl.peel(mesh.vertices, mesh.faces, quality=quality)
+@pytest.mark.parametrize(("quality", "resolution"), [("balanced", 256), ("fast", 400)])
+@pytest.mark.parametrize("axis", [(1, 2, 3), (1, -0.5, 0.7)])
+def test_patches_end_at_edges(quality: str, resolution: int, axis: tuple[float, float, float]) -> None:
+    """Whichever way a box is turned, no edge may be taken for a surface that goes on in another map."""
+    mesh = many_triangled_box(axis)
+    maps = ldtrefl.peel(mesh.vertices, mesh.faces, resolution, quality=quality)
     assert maps.tree.patches
     found = differences(mesh, maps, 100_000, 9)
-    assert found["wrong_hits"] <= wrong and found["wrong_misses"] <= 0.05 and found["p99"] <= 0.2, found
+    assert found["wrong_hits"] + found["wrong_misses"] <= 0.005 and found["p999"] <= 0.01, found
 
 
 def rays_from_outside(count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:

@@ -23,7 +23,6 @@ from pydantic.dataclasses import dataclass
 from ldtrefl.cull import Culled, CullTest, cull_rays, not_culled
 from ldtrefl.device_scene import DeviceMesh, DeviceScene
 from ldtrefl.gbuffer import GBuffer
-from ldtrefl.items import Quality
 from ldtrefl.kept import Followed
 from ldtrefl.launch import Stats
 from ldtrefl.ldt import (
@@ -40,6 +39,7 @@ from ldtrefl.ldt import (
 )
 from ldtrefl.march import TRACERS
 from ldtrefl.methods.base import CONFIG, CommonConfig, Method, Reflection
+from ldtrefl.records_choice import Quality
 from ldtrefl.reflect import BoundTracer, follow_rays, no_shadows, shade_gbuffer
 from ldtrefl.resolution import resolutions_for
 from ldtrefl.scene import Camera

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import ldtrefl
 from ldtrefl import shapes
-from ldtrefl.items import FEW_TRIANGLES, Quality
+from ldtrefl.records_choice import FEW_TRIANGLES, Quality
 
 from .judge import DENSE, TEXELS, Limit, Outcome, Truth, describe, judge, linear_limit, moved
 

@@ -141,10 +141,10 @@ DENSE = limits(
         worst=1.0,
         p999=0.9,
         p99=0.4,
-        wrong=0.3,
+        wrong=0.2,
         slips=True,
         place=np.inf,
-        why="a patch is a plane of 1.6 texels: silhouettes move by up to half of one",
+        why="a patch is a plane of at most 1.4 texels: silhouettes move by up to half of one",
     ),
     fast=Limit(
         radius=3.0,
@@ -154,8 +154,8 @@ DENSE = limits(
         wrong=1.2,
         slips=True,
         place=np.inf,
-        why="a patch is a plane of 4 texels: at silhouettes one ray in 150 ends on another surface, so that of all "
-        "hits the 99.9th percentile is 80 texels",
+        why="a patch is a plane of at most 3.2 texels: at silhouettes one ray in 300 ends on another surface, so that "
+        "of all hits the 99.9th percentile is 60 texels",
     ),
 )
 """Limits where triangles are smaller than texels and patches stand for them."""
