@@ -34,10 +34,11 @@ from ldtrefl.raster import (
 FACING = wp.constant(0.55)
 """|n . axis| from which a map keeps a fragment as a patch: every direction faces one of the three with 0.577 or more.
 At 0.577 itself, where two maps meet on a bent surface, twice as many rays slipped between their patches."""
-FACING_MOST = wp.constant(0.9)
-"""|n . axis| over the largest of the three from which a map keeps it. Where another map faces a surface much better,
-its patches are good and these are long and slanted: with 0.8 there are 8% more patches of a knot and as many wrong
-rays; with none, 15% more patches and 7% more wrong rays."""
+FACING_MOST = 0.9
+"""|n . axis| over the largest of the three from which a map keeps it, of surfaces that are smooth. Where another map
+faces them much better, its patches are good and these are long and slanted: with 0.8 there are 8% more patches of a
+knot and as many wrong rays; with none, 15% more patches and 7% more wrong rays. On a rough surface, where normals go to
+and fro, it would leave holes."""
 PATCH_MARGIN = wp.constant(0.08)
 """Part of a patch's side added around it, so that neighbours on a bent surface overlap instead of leaving a slit. With
 0.02 one ray in a thousand slipped through to the far wall, specks in the picture; with 0.06 one in ten thousand, at a
@@ -56,6 +57,7 @@ class PatchTarget:
     faces: wp.array(dtype=wp.vec3i)
     size: wp.vec3i  # texels
     first_texel: wp.vec3i  # of each axis' map
+    facing_most: float  # |n . axis| over the largest of the three from which a map keeps a fragment
     cells_per_texel: float
     cells: wp.vec3i
 
@@ -85,10 +87,10 @@ def fixed_normal(a: wp.vec4i, b: wp.vec4i, c: wp.vec4i) -> wp.vec3:
 
 
 @wp.func
-def faces_map(normal: wp.vec3, axis: int) -> bool:
+def faces_map(normal: wp.vec3, axis: int, facing_most: float) -> bool:
     """Whether a map keeps fragments of this unit normal as patches."""
     across = wp.max(wp.abs(normal[(axis + 1) % 3]), wp.abs(normal[(axis + 2) % 3]))
-    return wp.abs(normal[axis]) >= wp.max(FACING, FACING_MOST * across)
+    return wp.abs(normal[axis]) >= wp.max(FACING, facing_most * across)
 
 
 @wp.func
@@ -96,7 +98,7 @@ def facing_triangle(
     target: PatchTarget, axis: int, a: wp.vec4i, b: wp.vec4i, c: wp.vec4i, normal: wp.vec3
 ) -> FixedTriangle:
     """A triangle in the map of ``axis``; area 0 if the map does not face it."""
-    if not faces_map(normal, axis):
+    if not faces_map(normal, axis, target.facing_most):
         return FixedTriangle()
     u, v = (axis + 1) % 3, (axis + 2) % 3
     return fixed_triangle(a[u], a[v], b[u], b[v], c[u], c[v], target.size[u], target.size[v])
@@ -263,15 +265,17 @@ def list_kept(
 
 
 class Survey:
-    """The survey of a mesh's triangles in a box of texels, with ``cells`` along its longest side."""
+    """The survey of a mesh's triangles in a box of texels, with ``cells`` along its longest side; ``smooth`` if patches
+    will only be used where the surface is."""
 
-    def __init__(self, geometry: DeviceMesh, frame: TexelFrame, cells: int) -> None:
+    def __init__(self, geometry: DeviceMesh, frame: TexelFrame, cells: int, *, smooth: bool) -> None:
         self._device, self.triangles = geometry.vertices.device, len(geometry.faces)
         self.frame, self.cells_per_texel = frame, cells / max(frame.size)
         self.cells = wp.vec3i(*frame.cells(cells))
         target = PatchTarget()
         target.fixed, target.faces = snapped_vertices(geometry, frame), geometry.faces
         target.size, target.first_texel = wp.vec3i(*frame.size), wp.vec3i(*frame.first_texels[:3])
+        target.facing_most = FACING_MOST if smooth else 0.0
         target.cells_per_texel, target.cells = self.cells_per_texel, self.cells
         self._target = target
         chunks = chunk_count(self.triangles)

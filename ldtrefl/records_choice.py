@@ -203,7 +203,8 @@ def _surveyed(
     that may, or 0) for triangles whose longest edge is ``edge`` texels."""
     triangles = len(geometry.faces)
     frame = texel_frame(geometry.mesh, max(1, round(resolution / side)))
-    survey = Survey(geometry, frame, max(1, min(SURVEY_CELLS, round(SURVEY_CELLS_PER_PATCH * max(frame.size)))))
+    cells = max(1, min(SURVEY_CELLS, round(SURVEY_CELLS_PER_PATCH * max(frame.size))))
+    survey = Survey(geometry, frame, cells, smooth=not trusted)
     if survey.count == 0 or not _may_pay(survey, survey.count, quality):
         return None, 0.0
     doubts = no_doubts(survey) if trusted else doubts_of(survey, LARGEST_TURN[quality])

@@ -146,7 +146,7 @@ def test_patches_are_smaller_where_limbs_are_thin() -> None:
 def test_what_cannot_pay_is_not_surveyed(
     mesh: object, quality: records_choice.Quality, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def survey(*_: object) -> None:
+    def survey(*_: object, **__: object) -> None:
         raise AssertionError("a survey in vain")
 
     monkeypatch.setattr(records_choice, "Survey", survey)
