@@ -64,8 +64,8 @@ OWN_STEP = 1.0 / 8.0
 
 OWN_RISE = 0.02
 """Halves of a patch's side by which a ray may start beneath a patch and pass through it: it has left the surface that
-the patch stands for and rises over. Of rays that start on a knot of 500,000 triangles 23% end at their own patches
-without this, 7% with it, and 0.1% with 0.1; but as much is lost of rays that do start inside, 0.01% and 0.12%."""
+the patch stands for, which is bent. Of rays that start on a knot of 500,000 triangles 2.5% end at their own patches so,
+0.14% at 0.05; but of rays that do start inside, as close to the surface, as many are lost: 0.03% and 0.08%."""
 
 
 CONSTANTS: dict[str, float | int] = {
