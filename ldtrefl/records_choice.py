@@ -157,17 +157,21 @@ class Sample:
     """
 
     def __init__(self, mesh: Mesh, side: float) -> None:
-        self._length = 2.0 * side * mesh.unit_frame[1]
-        self._vertices = mesh.vertices
+        self._length = 2.0 * side  # in unit space, where no area leaves float64's range
+        self._mesh = mesh
         first = np.linspace(0, len(mesh.faces) - 2, SAMPLE).astype(np.int64)
         self._faces, self._next = mesh.faces[first], mesh.faces[first + 1]
-        self._corners = self._vertices[self._faces]
+        self._corners = self._corners_of(self._faces)
         self._normal, self._area = _facet(self._corners)
         extent = (self._corners.max(axis=1) - self._corners.min(axis=1)).max(axis=1)
         self._is_small = extent <= 2.0 * self._length
         surface = float(self._area[self._is_small].sum()) / self._length**2
-        self.density = np.count_nonzero(self._is_small) / surface if surface > 0.0 else np.inf
-        """Small triangles per patch of their surface."""
+        self.density = np.count_nonzero(self._is_small) / surface if surface > 0.0 else 0.0
+        """Small triangles per patch of their surface; 0 if they have none, as nothing can stand for them."""
+
+    def _corners_of(self, faces: np.ndarray) -> np.ndarray:
+        centre, half = self._mesh.unit_frame
+        return (self._mesh.vertices[faces] - centre) / half
 
     def longest_edge(self) -> float:
         """Of small triangles, in sides of a patch; the mean over their surface."""
@@ -181,7 +185,7 @@ class Sample:
         are_joined &= self._is_small & (self._area > 0.0)
         if np.count_nonzero(are_joined) < FEWEST_PAIRS:
             return 0.0
-        here, there = self._corners[are_joined], self._vertices[self._next[are_joined]]
+        here, there = self._corners[are_joined], self._corners_of(self._next[are_joined])
         normal = self._normal[are_joined]
         other, _ = _facet(there)
         angle = np.arctan2(np.linalg.norm(np.cross(normal, other), axis=1), (normal * other).sum(axis=1))

@@ -164,3 +164,13 @@ def test_a_sample_tells_density_and_turns() -> None:
     order = np.random.default_rng(0).permutation(len(ball.faces))
     mixed = Sample(ldtrefl.Mesh(ball.vertices, ball.faces[order]), side)
     assert mixed.density == pytest.approx(sample.density, rel=0.1) and mixed.turn() == 0.0
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("size", [1e-90, 1.0, 1e90])
+def test_triangles_without_area_are_kept(size: float) -> None:
+    """Nothing can stand for what has no surface, and no size of a mesh is too large or too small to say so."""
+    rng = np.random.default_rng(0)
+    along = rng.uniform(-1, 1, (3 * 60_000, 1)) * np.array([[1.0, 2.0, 3.0]]) * size
+    faces = np.arange(3 * 60_000).reshape(-1, 3)
+    assert not ldtrefl.peel(along, faces).tree.patches
