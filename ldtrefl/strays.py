@@ -100,14 +100,15 @@ def first_stray(strays: Strays, origin: wp.vec3d, direction: wp.vec3, t_max: flo
     hit = no_hit()
     for group in range((strays.triangles.shape[0] + 7) / 8):
         entered = boxes_entered(strays.boxes, group, origin, direction, t_max)
-        for k in range(8):
-            if (entered >> k) & 1 == 1 and 8 * group + k < strays.triangles.shape[0]:
-                nearest = t_max
-                if hit.triangle >= 0:
-                    nearest = hit.t
-                one = stray_hit(strays.triangles[8 * group + k], origin, direction, nearest)
-                if one.triangle >= 0:
-                    hit = one
+        if entered != 0:
+            for k in range(8):
+                if (entered >> k) & 1 == 1 and 8 * group + k < strays.triangles.shape[0]:
+                    nearest = t_max
+                    if hit.triangle >= 0:
+                        nearest = hit.t
+                    one = stray_hit(strays.triangles[8 * group + k], origin, direction, nearest)
+                    if one.triangle >= 0:
+                        hit = one
     return hit
 
 
