@@ -18,17 +18,8 @@ from ldtrefl import launch, warp_abi
 from ldtrefl.device_scene import DeviceMesh
 from ldtrefl.errors import InputError
 from ldtrefl.hit import Hit
-
-SHORTEST = wp.constant(1.0e-15)
-LONGEST = wp.constant(1.0e15)
-"""Lengths of directions whose squares stay well inside float32's range."""
-
-
-@wp.func
-def is_number(x: float) -> bool:
-    """Whether x is finite: a comparison, where ``wp.isfinite`` is a call into the C library."""
-    return wp.abs(x) < wp.inf
-
+from ldtrefl.native_sources import native_body
+from ldtrefl.shade import ONE_THIRD
 
 RAY_BLOCK = wp.constant(64)
 """Rays that are searched for together on the CPU: as many as a block of 8 x 8 pixels has."""
@@ -153,53 +144,27 @@ def block_of(device: wp.Device) -> int:
     return int(RAY_BLOCK) if device.is_cpu else 1
 
 
+FILES = ("vectors.h", "ray_batch.h")
+"""What native functions here are made of."""
+
 START = """
+    static_assert(sizeof(queries.data[0]) == sizeof(RayBatch::Query), "a Query as it is here");
+    const int limits = t_max.shape[0];
     int invalid = 0;
     for (int k = 0; k < count; ++k) {
-        auto& origin = origins.data[begin + k];
-        auto& direction = directions.data[begin + k];
-        auto& query = queries.data[k];
-        const float x = direction[0], y = direction[1], z = direction[2];
-        const float square = x * x + y * y + z * z;
-        float scale = 1.0f;
-        if (!(square > 0.5f && square < 2.0f)) {
-            // Not about as long as 1: by a power of two, which rounds nothing.
-            const float a = wp::abs(x), b = wp::abs(y), c = wp::abs(z);
-            const float largest = a > b ? (a > c ? a : c) : (b > c ? b : c);
-            int bits;
-            memcpy(&bits, &largest, 4);
-            const int exponent = bits >> 23;  // of the scale 254 less this, but from 1 on
-            bits = (exponent < 254 ? 254 - exponent : 1) << 23;
-            memcpy(&scale, &bits, 4);
-            if (!(largest > 0.0f && a < INFINITY && b < INFINITY && c < INFINITY)) scale = 0.0f;
-        }
-        const bool is_finite = wp::abs(origin[0]) < INFINITY && wp::abs(origin[1]) < INFINITY
-            && wp::abs(origin[2]) < INFINITY;
-        // Shift and scale in float64: the object may be tiny and far from its origin.
-        for (int i = 0; i < 3; ++i) {
-            query.origin[i] = per_half * ((double)origin[i] - centre[i]);
-            query.direction[i] = scale * direction[i];
-        }
-        query.t_max = INFINITY;
-        if (t_max.shape[0] > 0) {
-            const float end = t_max.data[t_max.shape[0] > 1 ? begin + k : 0];
-            query.t_max = (float)(end * per_half / scale);
-        }
-        if (!(is_finite && scale > 0.0f)) {
-            for (int i = 0; i < 3; ++i) {
-                query.origin[i] = 0.0;
-                query.direction[i] = 1.0f;
-            }
-            query.t_max = -1.0f;
-            ++invalid;
-        }
+        const int i = begin + k;
+        const float end = limits == 0 ? INFINITY : t_max.data[limits > 1 ? i : 0];
+        const float scale = RayBatch::start(
+            ((RayBatch::Query*)queries.data)[k], &origins.data[i][0], &directions.data[i][0], end, &centre[0], per_half
+        );
         scales.data[k] = scale;
+        invalid += scale > 0.0f ? 0 : 1;
     }
     return invalid;
 """
 
 
-@wp.func_native(START)
+@wp.func_native(native_body({}, FILES, START))
 def start_queries(
     origins: wp.array(dtype=wp.vec3),
     directions: wp.array(dtype=wp.vec3),
@@ -220,18 +185,17 @@ FINISH = """
     for (int k = 0; k < count; ++k) {
         auto& hit = hits.data[k];
         const int i = begin + k;
-        const bool is_met = hit.triangle >= 0;
+        const bool is_met = hit.triangle >= 0, is_known = hit.u >= 0.0f;
         triangle.data[i] = hit.triangle;
         t.data[i] = is_met ? (float)(hit.t * (scales.data[k] / per_half)) : INFINITY;
-        const float third = 1.0f / 3.0f;
-        barycentrics.data[i][0] = is_met ? (hit.u < 0.0f ? third : hit.u) : 0.0f;
-        barycentrics.data[i][1] = is_met ? (hit.u < 0.0f ? third : hit.v) : 0.0f;
+        barycentrics.data[i][0] = !is_met ? 0.0f : is_known ? hit.u : ONE_THIRD;
+        barycentrics.data[i][1] = !is_met ? 0.0f : is_known ? hit.v : ONE_THIRD;
         for (int axis = 0; axis < 3; ++axis) normal.data[i][axis] = is_met ? hit.normal[axis] : 0.0f;
     }
 """
 
 
-@wp.func_native(FINISH)
+@wp.func_native(native_body({"ONE_THIRD": float(ONE_THIRD)}, (), FINISH))
 def write_hits(
     hits: wp.array(dtype=Hit),
     scales: wp.array(dtype=float),

@@ -30,6 +30,7 @@ SHIM = """
 SOURCES = {
     "march_linear.h": (march_linear.CONSTANTS, ()),
     "vectors.h": (tree_build.CONSTANTS, ()),
+    "ray_batch.h": ({}, ("vectors.h",)),
     "tree_build.h": (tree_build.CONSTANTS, ("vectors.h",)),
     "tree_walk.h": (tree_walk.CONSTANTS, ("vectors.h",)),
     "tree_answer.h": (tree_walk.CONSTANTS, ("vectors.h", "tree_walk.h")),
