@@ -283,8 +283,7 @@ class LayeredDepthTexture:
             InputError: shapes that do not fit, what is not a number, an unknown search, or a number of steps that is
                 not allowed.
         """
-        view = self.view(search, linear_steps=linear_steps, binary_steps=binary_steps)
-        views = array_of_views([view], TRACERS[search].view, self.geometry.vertices.device)
+        views = self._views(search, linear_steps, binary_steps)
         return trace_batch(TRACERS[search], views, self.geometry, origins, directions, t_max)
 
     def occluded(
@@ -298,9 +297,13 @@ class LayeredDepthTexture:
         binary_steps: int = BINARY_STEPS,
     ) -> Any:
         """(...) bool: whether rays meet the object at all; arguments and errors as :meth:`trace` has them."""
-        view = self.view(search, linear_steps=linear_steps, binary_steps=binary_steps)
-        views = array_of_views([view], TRACERS[search].view, self.geometry.vertices.device)
+        views = self._views(search, linear_steps, binary_steps)
         return occluded_batch(TRACERS[search], views, self.geometry, origins, directions, t_max)
+
+    def _views(self, search: str, linear_steps: LinearSteps, binary_steps: int) -> wp.array:
+        """:meth:`view` as kernels read it; what it points to is owned by these maps."""
+        view = self.view(search, linear_steps=linear_steps, binary_steps=binary_steps)
+        return array_of_views([view], TRACERS[search].view, self.geometry.vertices.device)
 
     def save(self, path: str | Path) -> None:
         """Write the maps and their mesh to one file, whole or not at all.
