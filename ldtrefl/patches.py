@@ -34,12 +34,6 @@ from ldtrefl.raster import (
 FACING = wp.constant(0.55)
 """|n . axis| from which a map keeps a fragment as a patch: every direction faces one of the three with 0.577 or more.
 At 0.577 itself, where two maps meet on a bent surface, twice as many rays slipped between their patches."""
-FACING_MOST = 0.75
-"""|n . axis| over the largest of the three from which a map keeps it, of surfaces that are smooth. Where another map
-faces them much better, its patches are good and these are long and slanted: with none there are 4% more patches of a
-knot and 4% more wrong rays. With 0.9 there are 10% fewer, but large patches leave slits where two maps meet: of 200,000
-rays 157 slipped through fast ones that faced them, with this 16. On a rough surface, where normals go to
-and fro, it would leave holes."""
 PATCH_MARGIN = wp.constant(0.08)
 """Part of a patch's side added around it, so that neighbours on a bent surface overlap instead of leaving a slit. With
 0.02 one ray in a thousand slipped through to the far wall, specks in the picture; with 0.06 one in ten thousand, at a
@@ -266,17 +260,17 @@ def list_kept(
 
 
 class Survey:
-    """The survey of a mesh's triangles in a box of texels, with ``cells`` along its longest side; ``smooth`` if patches
-    will only be used where the surface is."""
+    """The survey of a mesh's triangles in a box of texels, with ``cells`` along its longest side. A map keeps what faces
+    it with ``facing_most`` of the largest of the three |n . axis|."""
 
-    def __init__(self, geometry: DeviceMesh, frame: TexelFrame, cells: int, *, smooth: bool) -> None:
+    def __init__(self, geometry: DeviceMesh, frame: TexelFrame, cells: int, facing_most: float) -> None:
         self._device, self.triangles = geometry.vertices.device, len(geometry.faces)
         self.frame, self.cells_per_texel = frame, cells / max(frame.size)
         self.cells = wp.vec3i(*frame.cells(cells))
         target = PatchTarget()
         target.fixed, target.faces = snapped_vertices(geometry, frame), geometry.faces
         target.size, target.first_texel = wp.vec3i(*frame.size), wp.vec3i(*frame.first_texels[:3])
-        target.facing_most = FACING_MOST if smooth else 0.0
+        target.facing_most = facing_most
         target.cells_per_texel, target.cells = self.cells_per_texel, self.cells
         self._target = target
         chunks = chunk_count(self.triangles)
