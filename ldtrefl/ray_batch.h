@@ -22,8 +22,8 @@ struct RayBatch : Vectors {
     }
 
     // Shift and scale in float64: the object may be tiny and far from its origin. ``centre`` and ``per_half`` are those
-    // of unit space, ``end`` is t up to where hits count. Returns the direction's scale; 0 if the ray is none, which then
-    // searches for nothing.
+    // of unit space, ``end`` is t up to where hits count. Returns the direction's scale; 0 if the ray is none, which
+    // then searches for nothing.
     SHARED float start(
         Query& query, const float* origin, const float* direction, float end, const double* centre, double per_half
     ) {

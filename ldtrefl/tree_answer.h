@@ -21,7 +21,7 @@ struct TreeAnswer : TreeWalk {
     SHARED Answer to(const Tree& tree, const Rays& rays, int lane) {
         const float* r = tree.rows + rays.met[lane];
         Answer answer;
-        answer.t = greater((float)(rays.skipped[lane] + rays.nearest[lane]), 0.0f);
+        answer.t = (float)(rays.skipped[lane] + rays.nearest[lane]);
         if (rays.met_patch[lane]) {
             answer.triangle = as_int(r[PATCH_NUMBER * LANES]);
             const float axis = r[PATCH_KIND * LANES];
@@ -48,8 +48,8 @@ struct TreeAnswer : TreeWalk {
         for (int k = 0; k < 3; ++k) unit[k] = (float)(normal[k] * per_length);
     }
 
-    // How far along the back of a surface a ray goes: above 0 it comes from within. ``front`` is the side of the normals
-    // that can be seen from outside, 1 or -1.
+    // How far along the back of a surface a ray goes: above 0 it comes from within. ``front`` is the side of the
+    // normals that can be seen from outside, 1 or -1.
     SHARED float facing(const Answer& answer, const float* direction, float front) {
         return front * dot(answer.normal, direction) / sqrtf(dot(direction, direction));
     }
@@ -80,7 +80,9 @@ struct TreeAnswer : TreeWalk {
             }
             probe.t_max = FAR;
             const bool is_leaving = is_own(tree, answer, query.direction, facing(answer, query.direction, front));
-            if (!is_leaving && finds(rays, tree, probe, steps) && facing(to(tree, rays, 0), probe.direction, front) > 0.0f) break;
+            if (!is_leaving && finds(rays, tree, probe, steps)
+                && facing(to(tree, rays, 0), probe.direction, front) > 0.0f)
+                break;
             // By more than t's rounding, so that it does go on.
             const float past = (float)(answer.t - behind);
             const double passed = past + greater(is_leaving ? OWN_STEP * tree.half_patch : horizon, T_ROUNDING * past);

@@ -42,7 +42,7 @@ struct TreeWalk : Vectors {
     struct Rays {
         float origin[3][LANES], direction[3][LANES];
         float inverse[3][LANES], scaled[3][LANES];  // 1 / direction, and origin / direction
-        float turned[3][LANES], shear[3][LANES];  // the origin along the axes of ``along``; what turns the last into the ray's
+        float turned[3][LANES], shear[3][LANES];  // the origin along the axes of ``along``, and Woop's shear
         float nearest[LANES];  // t of what was met, or up to where something is looked for
         const Query* asked;  // of each lane
         double skipped[LANES];  // t from where it was asked for to ``origin``
@@ -144,13 +144,14 @@ struct TreeWalk : Vectors {
     // Slab tests: a bit for each of a node's boxes that a ray enters before what it has met; where, in ``entry``.
     SHARED int boxes_entered(const float* node, const Rays& rays, int ray, Eight& entry) {
         FUSED
-        const Eight ix = eight(rays.inverse[0][ray]), iy = eight(rays.inverse[1][ray]), iz = eight(rays.inverse[2][ray]);
-        const Eight sx = eight(rays.scaled[0][ray]), sy = eight(rays.scaled[1][ray]), sz = eight(rays.scaled[2][ray]);
-        const Eight in_x = load(node + rays.near_side[0][ray]) * ix - sx, out_x = load(node + far_side(rays.near_side[0][ray])) * ix - sx;
-        const Eight in_y = load(node + rays.near_side[1][ray]) * iy - sy, out_y = load(node + far_side(rays.near_side[1][ray])) * iy - sy;
-        const Eight in_z = load(node + rays.near_side[2][ray]) * iz - sz, out_z = load(node + far_side(rays.near_side[2][ray])) * iz - sz;
-        entry = greater(greater(in_x, in_y), greater(in_z, eight(0.0f)));
-        const Eight exit = lesser(lesser(out_x, out_y), lesser(out_z, eight(rays.nearest[ray])));
+        Eight in[3], out[3];
+        for (int k = 0; k < 3; ++k) {
+            const Eight inverse = eight(rays.inverse[k][ray]), scaled = eight(rays.scaled[k][ray]);
+            in[k] = load(node + rays.near_side[k][ray]) * inverse - scaled;
+            out[k] = load(node + far_side(rays.near_side[k][ray])) * inverse - scaled;
+        }
+        entry = greater(greater(in[0], in[1]), greater(in[2], eight(0.0f)));
+        const Eight exit = lesser(lesser(out[0], out[1]), lesser(out[2], eight(rays.nearest[ray])));
         return bits(entry <= exit);
     }
 
@@ -175,10 +176,11 @@ struct TreeWalk : Vectors {
         const float* c = b + 3 * LANES;
         const int x = rays.along[0][ray], y = rays.along[1][ray], z = rays.along[2][ray];
         const Eight ox = eight(rays.turned[0][ray]), oy = eight(rays.turned[1][ray]), oz = eight(rays.turned[2][ray]);
+        const Eight sx = eight(rays.shear[0][ray]), sy = eight(rays.shear[1][ray]);
         const Eight az = load(a + z) - oz, bz = load(b + z) - oz, cz = load(c + z) - oz;
-        const Eight ax = sheared(load(a + x) - ox, rays.shear[0][ray], az), ay = sheared(load(a + y) - oy, rays.shear[1][ray], az);
-        const Eight bx = sheared(load(b + x) - ox, rays.shear[0][ray], bz), by = sheared(load(b + y) - oy, rays.shear[1][ray], bz);
-        const Eight cx = sheared(load(c + x) - ox, rays.shear[0][ray], cz), cy = sheared(load(c + y) - oy, rays.shear[1][ray], cz);
+        const Eight ax = sheared(load(a + x) - ox, sx, az), ay = sheared(load(a + y) - oy, sy, az);
+        const Eight bx = sheared(load(b + x) - ox, sx, bz), by = sheared(load(b + y) - oy, sy, bz);
+        const Eight cx = sheared(load(c + x) - ox, sx, cz), cy = sheared(load(c + y) - oy, sy, cz);
         const Eight u = difference_of_products(cx, by, cy, bx);
         const Eight v = difference_of_products(ax, cy, ay, cx);
         const Eight w = difference_of_products(bx, ay, by, ax);
@@ -196,14 +198,15 @@ struct TreeWalk : Vectors {
             return true;
         }
         bool is_met = false;
-        for (int lanes = bits(is_some & (first <= eight(rays.nearest[ray])) & (last >= none)); lanes; lanes &= lanes - 1)
+        int lanes = bits(is_some & (first <= eight(rays.nearest[ray])) & (last >= none));
+        for (; lanes; lanes &= lanes - 1)
             is_met |= meet_triangle(rows, LANES * row + lowest_bit(lanes), rays, ray);
         return is_met;
     }
 
-    SHARED Eight sheared(Eight across, float shear, Eight along) {
+    SHARED Eight sheared(Eight across, Eight shear, Eight along) {
         FUSED
-        return across - eight(shear) * along;
+        return across - shear * along;
     }
 
     SHARED float dot(const float* a, const float* b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
@@ -234,7 +237,7 @@ struct TreeWalk : Vectors {
         const double inverse = -1.0 / dot(normal, way);
         double t = dot(normal, from) * inverse, u = dot(across, edge_v) * inverse, v = -dot(across, edge_u) * inverse;
         if (!(u >= 0.0 && v >= 0.0 && u + v <= 1.0)) t = put_on_edge(from, way, edge_u, edge_v, u, v);
-        const float moved = (float)(t - rays.skipped[ray]);
+        const float moved = greater((float)(t - rays.skipped[ray]), 0.0f);
         if (!(t >= -START_ROUNDING && is_nearer(rays, ray, moved, place))) return false;
         keep(rays, ray, moved, place, false);
         rays.u[ray] = (float)u;
@@ -242,8 +245,8 @@ struct TreeWalk : Vectors {
         return true;
     }
 
-    // A ray that passes a triangle by less than rounding meets it where it comes nearest to the edge that it passes: where
-    // it crosses the plane may be far away if it grazes that. The new t.
+    // A ray that passes a triangle by less than rounding meets it where it comes nearest to the edge that it passes:
+    // where it crosses the plane may be far away if it grazes that. The new t.
     OUT_OF_LINE double put_on_edge(
         const double* from, const double* way, const double* edge_u, const double* edge_v, double& u, double& v
     ) {
@@ -268,7 +271,8 @@ struct TreeWalk : Vectors {
         FUSED
         const float* r = rows + (size_t)row * LANES;
         const Eight ox = eight(rays.origin[0][ray]), oy = eight(rays.origin[1][ray]), oz = eight(rays.origin[2][ray]);
-        const Eight dx = eight(rays.direction[0][ray]), dy = eight(rays.direction[1][ray]), dz = eight(rays.direction[2][ray]);
+        const float* way[3] = {rays.direction[0] + ray, rays.direction[1] + ray, rays.direction[2] + ray};
+        const Eight dx = eight(*way[0]), dy = eight(*way[1]), dz = eight(*way[2]);
         const Eight nx = load(r), ny = load(r + LANES), nz = load(r + 2 * LANES);
         const Eight slope = nx * dx + ny * dy + nz * dz;
         const Eight height = load(r + 3 * LANES) - (nx * ox + ny * oy + nz * oz);
@@ -367,6 +371,12 @@ struct TreeWalk : Vectors {
         return child;
     }
 
+    SHARED int next_child(
+        const Tree& tree, const float* node, const Eight& entry, int set, Later* stack, int& top, bool any
+    ) {
+        return any ? any_child(node, entry, set, stack, top) : nearest_child(tree, node, entry, set, stack, top);
+    }
+
     // Back to a child that is entered before what was met; false if there is none.
     SHARED bool comes_back(float nearest, const Later* stack, int& top, int& child) {
         while (top) {
@@ -389,7 +399,7 @@ struct TreeWalk : Vectors {
                 const int set = boxes_entered(node, rays, ray, entry);
                 ++rays.steps[ray];
                 if (!set) break;
-                child = any ? any_child(node, entry, set, stack, top) : nearest_child(tree, node, entry, set, stack, top);
+                child = next_child(tree, node, entry, set, stack, top, any);
             }
             if (child < 0 && meet(tree, child, rays, ray, any) && any) return;
         } while (comes_back(rays.nearest[ray], stack, top, child));
@@ -399,6 +409,10 @@ struct TreeWalk : Vectors {
     }
     OUT_OF_LINE void find_any(const Tree& tree, Rays& rays, int ray, int child) {
         go_alone(tree, rays, ray, child, true);
+    }
+    SHARED void find(const Tree& tree, Rays& rays, int ray, int child, bool any) {
+        if (any) find_any(tree, rays, ray, child);
+        else find_nearest(tree, rays, ray, child);
     }
 
     // Intervals of all rays of a packet, signed as their octant is: the bounds of 1 / direction, and of the products by
@@ -495,8 +509,7 @@ struct TreeWalk : Vectors {
                 for (; live; live &= live - 1) {
                     const int ray = lowest_bit(live);
                     if (child < 0) meet(tree, child, rays, ray, any);
-                    else if (any) find_any(tree, rays, ray, child);
-                    else find_nearest(tree, rays, ray, child);
+                    else find(tree, rays, ray, child, any);
                     packet.nearest[ray] = any && rays.met[ray] >= 0 ? -1.0f : rays.nearest[ray];
                 }
                 farthest = most(load(packet.nearest));
@@ -534,12 +547,12 @@ struct TreeWalk : Vectors {
                     const int set = boxes_entered(node, own, ray, entry);
                     ++own.steps[ray];
                     comes_farther = set != 0;
-                    if (set && any) walker.child = any_child(node, entry, set, walker.stack, walker.top);
-                    else if (set) walker.child = nearest_child(tree, node, entry, set, walker.stack, walker.top);
+                    if (set) walker.child = next_child(tree, node, entry, set, walker.stack, walker.top, any);
                 } else {
                     is_done = meet(tree, walker.child, own, ray, any) && any;
                 }
-                if (!is_done && !comes_farther) is_done = !comes_back(own.nearest[ray], walker.stack, walker.top, walker.child);
+                if (!is_done && !comes_farther)
+                    is_done = !comes_back(own.nearest[ray], walker.stack, walker.top, walker.child);
                 if (is_done && next < count) {
                     set_out(walker, rays, listed[next++]);
                 } else if (is_done) {
@@ -575,11 +588,7 @@ struct TreeWalk : Vectors {
         if (in_turn && left > 1) {
             go_in_turn(tree, rays, alone, left, any);
         } else {
-            for (int k = 0; k < left; ++k) {
-                Rays& own = rays[alone[k] / LANES];
-                if (any) find_any(tree, own, alone[k] % LANES, 0);
-                else find_nearest(tree, own, alone[k] % LANES, 0);
-            }
+            for (int k = 0; k < left; ++k) find(tree, rays[alone[k] / LANES], alone[k] % LANES, 0, any);
         }
     }
 };

@@ -16,10 +16,8 @@ from ldtrefl.shade import barycentrics_at
 from ldtrefl.strays import first_stray
 from ldtrefl.trace import RAY_BLOCK, Query, Tracer
 from ldtrefl.tree import NODE, STACK, TreeView
+from ldtrefl.unit_rays import NEAR
 from ldtrefl.vectors import as_single, point_along
-
-NEAR = 8.0
-"""Unit space: distance from the middle beyond which a ray's way to the object is taken in float64."""
 
 BOX_SLACK = 1.0e-6
 """Relative rounding of where a ray enters the box about all, with some to spare: four operations."""
@@ -34,8 +32,8 @@ DEPTH_SLACK = 1.0e-6
 """Unit space: rounding of how far along a ray a corner lies, with some to spare."""
 
 START_ROUNDING = 3.1e-8
-"""Unit space: how far behind its start a ray still meets what it starts on, half a unit in
-the last place of a float32 coordinate up to 1."""
+"""Unit space: how far behind its start a ray still meets what it starts on: half a unit in the last place of a float32
+coordinate up to 1."""
 
 PACKET_SPREAD = 0.25
 """Unit space: how far the starts, and the directions, of the rays of a packet may lie apart along an axis."""
@@ -51,6 +49,9 @@ T_ROUNDING = 2.4e-7
 
 FAR = 1.0e30
 """Up to where a probe looks."""
+
+FETCHED_AHEAD = 4
+"""Answers ahead of which memory is asked for what they are made of."""
 
 LARGE_PATCH = wp.constant(-2.0)
 """In place of a barycentric: still to be found, as the triangle is larger than the patch."""
@@ -73,10 +74,11 @@ CONSTANTS: dict[str, float | int] = {
     "DEPTH_SLACK": DEPTH_SLACK,
     "EDGE_ON": EDGE_ON,
     "FAR": FAR,
+    "FETCHED_AHEAD": FETCHED_AHEAD,
     "GRAZING": GRAZING,
     "LARGE_PATCH": float(LARGE_PATCH),
     "MOST_DOUBTS": MOST_DOUBTS,
-    "NEAR": NEAR,
+    "NEAR": float(NEAR),
     "NEGLIGIBLE": NEGLIGIBLE,
     "OWN_RISE": OWN_RISE,
     "OWN_STEP": OWN_STEP,
@@ -104,7 +106,8 @@ SEARCH = """
     for (int i = 0; i < count; ++i) {
         const TreeWalk::Rays& own = rays[i / TreeWalk::LANES];
         const int lane = i % TreeWalk::LANES;
-        if (i + 4 < count) TreeAnswer::fetch_record(tree, rays[(i + 4) / TreeWalk::LANES], (i + 4) % TreeWalk::LANES);
+        const int later = i + FETCHED_AHEAD;
+        if (later < count) TreeAnswer::fetch_record(tree, rays[later / TreeWalk::LANES], later % TreeWalk::LANES);
         auto& hit = hits.data[i];
         hit.steps = own.steps[lane];
         hit.triangle = -1;
