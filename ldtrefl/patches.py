@@ -260,8 +260,8 @@ def list_kept(
 
 
 class Survey:
-    """The survey of a mesh's triangles in a box of texels, with ``cells`` along its longest side. A map keeps what faces
-    it with ``facing_most`` of the largest of the three |n . axis|."""
+    """The survey of a mesh's triangles in a box of texels, with ``cells`` along its longest side. A map keeps what has
+    ``facing_most`` of the largest of the three |n . axis| along its own axis."""
 
     def __init__(self, geometry: DeviceMesh, frame: TexelFrame, cells: int, facing_most: float) -> None:
         self._device, self.triangles = geometry.vertices.device, len(geometry.faces)

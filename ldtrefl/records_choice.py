@@ -47,10 +47,11 @@ PATCH_TEXELS: dict[Quality, float] = {"fast": 3.2, "balanced": 1.4}
 resolution of 256, 0.02% misses and a sixteenth of a texel of 128 at the 99th percentile; at 1.6 a quarter more, and a
 quarter fewer patches."""
 FACING_MOST: dict[Quality, float] = {"fast": 0.75, "balanced": 0.9}
-"""|n . axis| over the largest of the three from which a map keeps a patch. Where another map faces a surface much better,
-its patches are good and these are long and slanted: of balanced ones there are 15% more with none and 7% more rays are
-wrong. Large patches leave slits where two maps meet: with 0.9 157 of 200,000 rays slipped through fast ones that faced
-them, with 0.75 16. In trusted maps it is 0: on a rough surface, where normals go to and fro, it would leave holes."""
+"""|n . axis| over the largest of the three from which a map keeps a patch. Where another map faces a surface much
+better, its patches are good and these are long and slanted: of balanced ones there are 15% more with none and 7% more
+rays are wrong. Large patches leave slits where two maps meet: with 0.9, of 200,000 rays, 157 slipped through fast ones
+that faced them, with 0.75 16. In trusted maps it is 0: on a rough surface, where normals go to and fro, it would leave
+holes."""
 LARGEST_TURN: dict[Quality, float] = {"fast": 0.8, "balanced": 0.4}
 """Radians between neighbouring patches from which they are in doubt, see ``doubts.py``: the mean does not know a bad
 few."""

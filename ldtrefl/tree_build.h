@@ -260,4 +260,48 @@ struct TreeBuild : Vectors {
         }
         return count;
     }
+
+    // The nodes of the wide tree, a part before the next.
+    struct Wide {
+        int* parts;     // of each node the binary nodes of its eight parts, or -1
+        int* children;  // what ``tree_walk.h`` reads of them
+        int* waiting;   // what a ray may leave behind on its way to a node, and there
+        int nodes, rows, most_waiting;
+    };
+
+    // A binary node that becomes a wide one, and whose part it is.
+    struct Waiting {
+        int node, parent, lane;
+    };
+
+    // Gather all nodes; blocks of ``item``, patches below 0, are as many rows high as their kind. It gives up where more
+    // may wait than a ray can hold.
+    SHARED void gather_all(const Node* nodes, const int* item, int patch_rows, int triangle_rows, Wide& wide) {
+        Waiting waiting[TREE_STACK];
+        waiting[0] = {0, -1, 0};
+        int top = 1;
+        wide.nodes = wide.rows = wide.most_waiting = 0;
+        while (top) {
+            const Waiting one = waiting[--top];
+            const int node = wide.nodes++;
+            int* parts = wide.parts + LANES * node;
+            int* children = wide.children + LANES * node;
+            if (one.parent >= 0) wide.children[LANES * one.parent + one.lane] = node;
+            const int count = gather(nodes, one.node, parts);
+            wide.waiting[node] = (one.parent < 0 ? 0 : wide.waiting[one.parent]) + count;
+            if (wide.waiting[node] > wide.most_waiting) wide.most_waiting = wide.waiting[node];
+            if (wide.most_waiting > TREE_STACK) return;
+            for (int lane = count; lane < LANES; ++lane) parts[lane] = -1, children[lane] = 0;
+            for (int lane = count; lane-- > 0;) {
+                const Node& part = nodes[parts[lane]];
+                if (is_leaf(part)) {
+                    const bool is_patch = item[as_int(part.low[3])] < 0;
+                    children[lane] = ~(2 * wide.rows + (is_patch ? 1 : 0));
+                    wide.rows += is_patch ? patch_rows : triangle_rows;
+                } else {
+                    waiting[top++] = {parts[lane], node, lane};
+                }
+            }
+        }
+    }
 };

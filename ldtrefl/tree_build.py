@@ -42,6 +42,8 @@ CELLS_PER_ROOT = 0.13
 MOST_CELLS = 128
 GROUP = wp.constant(512)
 """Items of a group of cells, but where one cell holds more: some fit in a core's first cache."""
+REFERENCE_BYTES = wp.constant(32)
+"""Of a ``Reference``."""
 BYTES_PER_RECORD = 80
 """What a record takes, and what it is made from, at most."""
 MOST_RECORDS = 100_000_000
@@ -210,7 +212,7 @@ FILES = ("vectors.h", "tree_build.h")
 
 SPLIT = """
     return TreeBuild::split_all(
-        (TreeBuild::Reference*)references.data + begin, count, most, are_items != 0, by_halves != 0,
+        (TreeBuild::Reference*)references.data, count, most, are_items != 0, by_halves != 0,
         (TreeBuild::Node*)nodes.data + root, root + 1, first
     );
 """
@@ -219,7 +221,6 @@ SPLIT = """
 @wp.func_native(native_body(CONSTANTS, FILES, SPLIT))
 def split_all(
     references: wp.array(dtype=Reference),
-    begin: int,
     count: int,
     most: int,
     are_items: int,
@@ -228,7 +229,7 @@ def split_all(
     root: int,
     first: int,
 ) -> wp.int32:
-    """Split ``count`` references from ``begin`` on until at most ``most`` items are left together, and number them from
+    """Split ``count`` references until at most ``most`` items are left together, and number them from
     ``first``; nodes go to ``root`` and after it. Their number."""
     ...
 
@@ -244,26 +245,39 @@ def split_cells(
     nodes_out: wp.array(dtype=Node),
     count_out: wp.array(dtype=wp.int32),
 ):
-    count_out[0] = split_all(references, 0, references.shape[0], GROUP, 0, by_halves, nodes_out, 0, 0)
+    count_out[0] = split_all(references, references.shape[0], GROUP, 0, by_halves, nodes_out, 0, 0)
+
+
+@wp.struct
+class SortedItems:
+    """Items in the order of their cells."""
+
+    items: Items
+    item: wp.array(dtype=wp.int32)
+    start: wp.array(dtype=wp.int32)  # first of each cell
+    cells: wp.array(dtype=Reference)  # those that are occupied, in the order of the upper levels' leaves
+
+
+@wp.struct
+class Group:
+    """A leaf of the upper levels: some cells, and the room for what is made of their items."""
+
+    node: int
+    first_cell: int
+    cell_count: int
+    first_item: int  # in the order of the leaves
+    item_count: int
+    room: int  # first reference, where they are too many for the stack
 
 
 @wp.func
-def gather_items(
-    items: Items,
-    item: wp.array(dtype=wp.int32),
-    start: wp.array(dtype=wp.int32),
-    cells: wp.array(dtype=Reference),
-    first_cell: int,
-    cell_count: int,
-    references_out: wp.array(dtype=Reference),
-    place: int,
-):
-    """References to the items of some cells."""
-    at = int(place)
-    for k in range(first_cell, first_cell + cell_count):
-        cell = wp.cast(cells[k].low[3], wp.int32)
-        for i in range(start[cell], start[cell + 1]):
-            references_out[at] = reference_to(items, item[i])
+def gather_items(sorted_items: SortedItems, group: Group, references_out: wp.array(dtype=Reference)):
+    """References to the items of a group."""
+    at = int(0)
+    for k in range(group.first_cell, group.first_cell + group.cell_count):
+        cell = wp.cast(sorted_items.cells[k].low[3], wp.int32)
+        for i in range(sorted_items.start[cell], sorted_items.start[cell + 1]):
+            references_out[at] = reference_to(sorted_items.items, sorted_items.item[i])
             at += 1
 
 
@@ -271,76 +285,35 @@ def gather_items(
 def split_groups(
     first: int,
     # In:
-    items: Items,
-    item: wp.array(dtype=wp.int32),
-    start: wp.array(dtype=wp.int32),
-    cells: wp.array(dtype=Reference),
-    groups: wp.array(dtype=wp.vec3i),  # node; first and number of its cells
-    places: wp.array(dtype=wp.int32),  # first item of each group
+    sorted_items: SortedItems,
+    groups: wp.array(dtype=Group),
     by_halves: int,
-    own_nodes: int,  # where the nodes of the first item's group begin: two an item
-    room: wp.array(dtype=Reference),  # for groups that are too large for the stack
-    rooms: wp.array(dtype=wp.int32),  # where theirs begins
+    first_node: int,  # of the first item's: from there on there are two nodes an item
     # Out:
+    room: wp.array(dtype=Reference),
     nodes: wp.array(dtype=Node),
     item_out: wp.array(dtype=wp.int32),
 ):
-    g = first + wp.tid()
-    group = groups[g]
-    begin, count = places[g], places[g + 1] - places[g]
-    root = own_nodes + 2 * begin
-    if count <= GROUP:
-        own_room = wp.zeros(shape=GROUP, dtype=Reference)
-        own = wp.array(ptr=own_room.ptr, shape=(GROUP,), dtype=Reference)
-        gather_items(items, item, start, cells, group[1], group[2], own, 0)
-        split_all(own, 0, count, LANES, 1, by_halves, nodes, root, begin)
-        for i in range(count):
-            item_out[begin + i] = wp.cast(own[i].low[3], wp.int32)
-    else:
-        place = rooms[g]
-        gather_items(items, item, start, cells, group[1], group[2], room, place)
-        split_all(room, place, count, LANES, 1, by_halves, nodes, root, begin)
-        for i in range(count):
-            item_out[begin + i] = wp.cast(room[place + i].low[3], wp.int32)
-    nodes[group[0]] = nodes[root]
+    group = groups[first + wp.tid()]
+    own_room = wp.zeros(shape=GROUP, dtype=Reference)
+    address = own_room.ptr
+    if group.item_count > GROUP:
+        address = room.ptr + wp.uint64(REFERENCE_BYTES) * wp.uint64(group.room)
+    references = wp.array(ptr=address, shape=(group.item_count,), dtype=Reference)
+    gather_items(sorted_items, group, references)
+    root = first_node + 2 * group.first_item
+    split_all(references, group.item_count, LANES, 1, by_halves, nodes, root, group.first_item)
+    for i in range(group.item_count):
+        item_out[group.first_item + i] = wp.cast(references[i].low[3], wp.int32)
+    nodes[group.node] = nodes[root]
 
 
 GATHER = """
-    struct Waiting { int node, parent, lane; };
-    const TreeBuild::Node* binary = (const TreeBuild::Node*)nodes.data;
-    Waiting waiting[TREE_STACK];
-    waiting[0] = {0, -1, 0};
-    int top = 1, made = 0, row = 0, most_waiting = 1;
-    while (top) {
-        const Waiting one = waiting[--top];
-        const int node = made++;
-        int* own = parts.data + 8 * node;
-        int* codes = children.data + 8 * node;
-        if (one.parent >= 0) children.data[8 * one.parent + one.lane] = node;
-        const int count = TreeBuild::gather(binary, one.node, own);
-        // What a ray leaves behind on its way here, and what it may leave here.
-        const int left_behind = (one.parent < 0 ? 0 : before.data[one.parent]) + count;
-        before.data[node] = left_behind;
-        if (left_behind > most_waiting) most_waiting = left_behind;
-        if (most_waiting > TREE_STACK) break;
-        for (int lane = 0; lane < 8; ++lane) {
-            codes[lane] = 0;
-            if (lane >= count) own[lane] = -1;
-        }
-        for (int lane = count; lane-- > 0;) {
-            const TreeBuild::Node& part = binary[own[lane]];
-            if (TreeBuild::is_leaf(part)) {
-                const bool is_patch = item.data[TreeBuild::as_int(part.low[3])] < 0;
-                codes[lane] = ~(2 * row + (is_patch ? 1 : 0));
-                row += is_patch ? patch_rows : triangle_rows;
-            } else {
-                waiting[top++] = {own[lane], node, lane};
-            }
-        }
-    }
-    counts.data[0] = made;
-    counts.data[1] = row;
-    counts.data[2] = most_waiting;
+    TreeBuild::Wide wide = {parts.data, children.data, waiting.data};
+    TreeBuild::gather_all((const TreeBuild::Node*)nodes.data, item.data, patch_rows, triangle_rows, wide);
+    counts.data[0] = wide.nodes;
+    counts.data[1] = wide.rows;
+    counts.data[2] = wide.most_waiting;
 """
 
 
@@ -352,7 +325,7 @@ def gather_all(
     triangle_rows: int,
     parts: wp.array(dtype=wp.int32),
     children: wp.array(dtype=wp.int32),
-    before: wp.array(dtype=wp.int32),
+    waiting: wp.array(dtype=wp.int32),
     counts: wp.array(dtype=wp.int32),
 ):
     """Gather the nodes of the binary tree into those of the wide one, a part before the next."""
@@ -483,16 +456,13 @@ def _binary_tree(
     launch.launch(split_cells, 1, [references, int(by_halves), nodes, made], device)
 
     # The lower ones of each group of cells.
-    own_nodes = int(made.numpy()[0])
-    groups, sizes = _groups(nodes[:own_nodes], references)
-    places = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int32)
-    spacious = np.where(sizes > int(GROUP), sizes, 0)
-    rooms = (np.cumsum(spacious) - spacious).astype(np.int32)
-    room = wp.empty(max(1, int(spacious.sum())), dtype=Reference, device=device)
-    order = wp.empty_like(item)
-    inputs = [items, item, start, references, wp.array(groups, dtype=wp.vec3i, device=device)]
-    inputs += [wp.array(places, device=device), int(by_halves), own_nodes, room, wp.array(rooms, device=device)]
-    launch.launch(split_groups, len(groups), [*inputs, nodes, order], device)
+    upper_nodes = int(made.numpy()[0])
+    groups, in_room = _groups(nodes[:upper_nodes], references)
+    sorted_items = SortedItems()
+    sorted_items.items, sorted_items.item, sorted_items.start, sorted_items.cells = items, item, start, references
+    room, order = wp.empty(max(1, in_room), dtype=Reference, device=device), wp.empty_like(item)
+    inputs = [sorted_items, wp.array(groups, dtype=Group, device=device), int(by_halves), upper_nodes]
+    launch.launch(split_groups, len(groups), [*inputs, room, nodes, order], device)
     return nodes, order
 
 
@@ -507,15 +477,21 @@ def _cells_about(box: np.ndarray, count: int) -> Any:
     return cells
 
 
-def _groups(nodes: wp.array, references: wp.array) -> tuple[np.ndarray, np.ndarray]:
-    """(n, 3) int32, node and cells of each leaf of the upper levels; (n,) int, its items."""
+def _groups(nodes: wp.array, references: wp.array) -> tuple[np.ndarray, int]:
+    """(n,) ``Group`` of each leaf of the upper levels, and how many references have to lie in the room beside."""
     made = nodes.numpy()
-    count = ~np.ascontiguousarray(made["high"][:, 3]).view(np.int32)
-    leaves = np.flatnonzero(count >= 0)
-    first = np.ascontiguousarray(made["low"][leaves, 3]).view(np.int32)
-    weights = np.concatenate([[0], np.cumsum(references.numpy()["high"][:, 3], dtype=np.int64)])
-    sizes = weights[first + count[leaves]] - weights[first]
-    return np.stack([leaves, first, count[leaves]], axis=1).astype(np.int32), sizes
+    cells = ~np.ascontiguousarray(made["high"][:, 3]).view(np.int32)
+    leaves = np.flatnonzero(cells >= 0)
+    first_cell, cells = np.ascontiguousarray(made["low"][leaves, 3]).view(np.int32), cells[leaves]
+    items_before = np.concatenate([[0], np.cumsum(references.numpy()["high"][:, 3], dtype=np.int64)])
+    items = items_before[first_cell + cells] - items_before[first_cell]
+    in_room = np.where(items > int(GROUP), items, 0)
+    struct: Any = Group
+    groups = np.zeros(len(leaves), struct.numpy_dtype())
+    groups["node"], groups["first_cell"], groups["cell_count"] = leaves, first_cell, cells
+    groups["first_item"], groups["item_count"] = np.cumsum(items) - items, items
+    groups["room"] = np.cumsum(in_room) - in_room
+    return groups, int(in_room.sum())
 
 
 def _wide_tree(items: Any, nodes: wp.array, order: wp.array, geometry: DeviceMesh) -> Any:
