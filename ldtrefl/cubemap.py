@@ -22,12 +22,6 @@ FACE_NAMES = ("+x", "-x", "+y", "-y", "+z", "-z")
 
 
 @wp.func
-def texel_from_point(axis: int, p: wp.vec3) -> wp.vec3:
-    """(u, v, depth) of a texel-space point in the map of ``axis``."""
-    return wp.vec3(p[(axis + 1) % 3], p[(axis + 2) % 3], p[axis])
-
-
-@wp.func
 def point_from_texel(axis: int, t: wp.vec3) -> wp.vec3:
     """The texel-space point at (u, v, depth) of the map of ``axis``."""
     return wp.vec3(t[(5 - axis) % 3], t[(3 - axis) % 3], t[(4 - axis) % 3])
@@ -72,15 +66,6 @@ class TexelFrame:
 
 def texel_frame(mesh: Mesh, resolution: int) -> TexelFrame:
     """The box of texels about a mesh."""
-    return _about(mesh, mesh.bounds, resolution)
-
-
-def bulk_frame(mesh: Mesh, resolution: int) -> TexelFrame:
-    """The box of texels about a mesh without its strays."""
-    return _about(mesh, mesh.bulk, resolution)
-
-
-def _about(mesh: Mesh, box: np.ndarray, resolution: int) -> TexelFrame:
     centre, half = mesh.unit_frame
-    low, high = ((bound - centre) / half for bound in box)
+    low, high = ((bound - centre) / half for bound in mesh.bounds)
     return TexelFrame.around(low, high, resolution)

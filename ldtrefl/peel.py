@@ -280,7 +280,7 @@ class Rasteriser:
     """A mesh in its box of texels: counts its fragments, then makes them."""
 
     def __init__(self, geometry: DeviceMesh, frame: TexelFrame) -> None:
-        self._frame, self._device = frame, geometry.vertices.device
+        self._device = geometry.vertices.device
         self._triangles = len(geometry.faces)
         self._target = PeelTarget()
         self._target.fixed = snapped_vertices(geometry, frame)

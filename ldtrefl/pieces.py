@@ -1,14 +1,9 @@
-"""Pieces of a surface, and cells about them: what a record of the tree is made from.
-
-A piece is a triangle of the mesh, or a patch (``patches.py``): a parallelogram.
-"""
+"""Pieces of a surface, which patches (``patches.py``) are made of: parallelograms; and cells about them."""
 
 from __future__ import annotations
 
 import warp as wp
 
-TRIANGLE = wp.constant(-1)
-"""Kind of a piece that is a triangle; a patch's is the axis of its map, 0 to 2."""
 LARGE = wp.constant(4)
 """Added to the kind of a patch whose triangle is larger than its texel."""
 
@@ -17,31 +12,25 @@ LARGE = wp.constant(4)
 class Piece:
     """A corner, and the two edges from it."""
 
-    corner: wp.vec3  # a patch's in cells of the survey
+    corner: wp.vec3  # in cells of the survey
     edge_u: wp.vec3
     edge_v: wp.vec3
-    kind: int
+    kind: int  # the axis of its map, 0 to 2, and ``LARGE``
     triangle: int
 
 
 @wp.func
 def low_corner(piece: Piece) -> wp.vec3:
     """Of the box about a piece."""
-    b, c = piece.corner + piece.edge_u, piece.corner + piece.edge_v
-    low = wp.min(piece.corner, wp.min(b, c))
-    if piece.kind > TRIANGLE:
-        low = wp.min(low, b + piece.edge_v)
-    return low
+    none = wp.vec3(0.0)
+    return piece.corner + wp.min(piece.edge_u, none) + wp.min(piece.edge_v, none)
 
 
 @wp.func
 def high_corner(piece: Piece) -> wp.vec3:
     """Of the box about a piece."""
-    b, c = piece.corner + piece.edge_u, piece.corner + piece.edge_v
-    high = wp.max(piece.corner, wp.max(b, c))
-    if piece.kind > TRIANGLE:
-        high = wp.max(high, b + piece.edge_v)
-    return high
+    none = wp.vec3(0.0)
+    return piece.corner + wp.max(piece.edge_u, none) + wp.max(piece.edge_v, none)
 
 
 @wp.func

@@ -22,7 +22,7 @@ from ldtrefl.budget import memory_limit
 from ldtrefl.device_scene import DeviceMesh
 from ldtrefl.errors import InputError
 from ldtrefl.native_sources import native_body
-from ldtrefl.pieces import LARGE, Piece, high_corner, low_corner
+from ldtrefl.pieces import LARGE, Piece, cell_number, high_corner, low_corner, number_of_cell
 from ldtrefl.tree import (
     BOX_MARGIN,
     LANES,
@@ -127,12 +127,6 @@ def reference_to(items: Items, item: int) -> Reference:
     return made
 
 
-@wp.func
-def cell_along(x: float, cells: int) -> int:
-    """The cell that holds a coordinate; the nearest if none does."""
-    return wp.clamp(int(x), 0, cells - 1)
-
-
 @launch.kernel
 def number_cells(
     first: int,
@@ -152,10 +146,10 @@ def number_cells(
         size = wp.vec3i((size[0] + 1) / 2, (size[1] + 1) / 2, (size[2] + 1) / 2)
         per_unit *= 0.5
         extent *= 0.5
-    x = cell_along(per_unit * (0.5 * (box.low[0] + box.high[0]) - cells.low[0]), size[0])
-    y = cell_along(per_unit * (0.5 * (box.low[1] + box.high[1]) - cells.low[1]), size[1])
-    z = cell_along(per_unit * (0.5 * (box.low[2] + box.high[2]) - cells.low[2]), size[2])
-    cell_out[i] = before + (z * size[1] + y) * size[0] + x
+    x = cell_number(per_unit * (0.5 * (box.low[0] + box.high[0]) - cells.low[0]), size[0])
+    y = cell_number(per_unit * (0.5 * (box.low[1] + box.high[1]) - cells.low[1]), size[1])
+    z = cell_number(per_unit * (0.5 * (box.low[2] + box.high[2]) - cells.low[2]), size[2])
+    cell_out[i] = before + number_of_cell(size, x, y, z)
 
 
 def cell_count(size: Sequence[int]) -> int:

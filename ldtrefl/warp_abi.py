@@ -138,14 +138,6 @@ def array_of_structs(structs: Sequence[Any], dtype: Any, device: wp.Device) -> w
     return made.to(device)
 
 
-def copy_of_struct(struct: Any, dtype: Any) -> Any:
-    """Another struct with the same fields; arrays are shared."""
-    made = dtype()
-    for name in dtype.numpy_dtype()["names"]:
-        setattr(made, name, getattr(struct, name))
-    return made
-
-
 def array_bytes(array: wp.array) -> int:
     """Bytes that the elements of an array take."""
     return array.size * wp.types.type_size_in_bytes(array.dtype)
