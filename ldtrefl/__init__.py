@@ -1,36 +1,38 @@
 """ldtrefl: specular reflections on curved objects by layered depth textures, beside the ray-traced truth.
 
-The pipeline, one module a stage:
+The rooms, from the ground up; a room imports only those above it in this list. ``docs/architecture.md`` follows one
+reflected ray through them.
 
-    scene file -> Scene (toml_text, checked, scene, shapes, mesh_files, mesh, normals; budget)
-      -> arrays on the device (device_scene)
-      -> G-buffer: what the camera sees (gbuffer, zbuffer, raster)
-      -> a method (methods/): its tracer answers reflected rays (trace), whose life is written once (reflect)
-           ldt: cull (cull), as fine as needed (resolution), peel on first need (ldt: peel -> fragments -> occupancy;
-                items: patches, doubts -> tree_build -> tree; kept by cache, checked by tree_check), search (march:
-                tree_walk, march_linear)
-           bvh: the ground truth (raycast)
-      -> what stays from frame to frame (kept); what may be left out (skips)
-      -> shade, the same functions for all (shade) -> composite (render) -> image (image), compared (metrics)
+    base/       errors in one line, the memory budget, checked values, standard error
+    files/      pictures, files written whole, the cache of maps on disk
+    device/     kernels: compiled, launched, shared out over CPU threads; C++ for their bodies
+    geometry/   vectors, triangles, spheres, boxes, rasterisers
+    scene/      what a scene file says: camera, lights, materials, objects; meshes, their files, shapes
+    world/      the scene on the device: meshes, placed objects, lights, the camera as kernels read them
+    tracing/    rays, hits, what a tracer is; the ray caster (a BVH), which is the truth
+    shading/    the radiance of a surface, the same functions for every method
+    ldt/        layered depth textures: peeling, and the searches for a ray in them
+    frame/      what a frame is made of: G-buffer, bounces, reflection regions, what the next frame can use again
+    methods/    one reflection method a file
+    renderer.py the contents page: G-buffer -> method -> image
+    compare/    how far an image is from the truth
+    cli/        the command line, one file a command
 """
 
 from __future__ import annotations
 
 import importlib
-import sys
-from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from ldtrefl.errors import InputError
-    from ldtrefl.image import load_image, save_image
-    from ldtrefl.launch import Stats, set_threads
-    from ldtrefl.ldt import LayeredDepthTexture, peel
-    from ldtrefl.mesh import Mesh
-    from ldtrefl.mesh_files import load_mesh
-    from ldtrefl.raycast import Raycaster
-    from ldtrefl.render import Frame, Renderer, render
-    from ldtrefl.scene import (
+    from ldtrefl.base.budget import set_memory_limit
+    from ldtrefl.base.errors import InputError
+    from ldtrefl.device.launch import Stats, progress_to, set_threads
+    from ldtrefl.files.map_cache import MapCache, keep_maps_in
+    from ldtrefl.files.pictures import load_image, save_image
+    from ldtrefl.ldt.texture import LayeredDepthTexture, peel
+    from ldtrefl.renderer import Frame, Renderer, render
+    from ldtrefl.scene.description import (
         Camera,
         Environment,
         Light,
@@ -41,7 +43,10 @@ if TYPE_CHECKING:
         Scene,
         load_scene,
     )
-    from ldtrefl.trace import Hits
+    from ldtrefl.scene.mesh import Mesh
+    from ldtrefl.scene.readers.mesh_files import load_mesh
+    from ldtrefl.tracing.bvh import Raycaster
+    from ldtrefl.tracing.trace import Hits
 
 __all__ = [
     "Camera",
@@ -52,6 +57,7 @@ __all__ = [
     "LayeredDepthTexture",
     "Light",
     "Lighting",
+    "MapCache",
     "Material",
     "Mesh",
     "Object",
@@ -60,68 +66,58 @@ __all__ = [
     "Renderer",
     "Scene",
     "Stats",
+    "keep_maps_in",
     "load_image",
     "load_mesh",
     "load_scene",
     "peel",
+    "progress_to",
     "render",
     "save_image",
+    "set_memory_limit",
     "set_threads",
 ]
 
 _HOMES = {
-    "Camera": "scene",
-    "Environment": "scene",
-    "Frame": "render",
-    "Hits": "trace",
-    "InputError": "errors",
-    "LayeredDepthTexture": "ldt",
-    "Light": "scene",
-    "Lighting": "scene",
-    "Material": "scene",
-    "Mesh": "mesh",
-    "Object": "scene",
-    "Raycaster": "raycast",
-    "Reflection": "scene",
-    "Renderer": "render",
-    "Scene": "scene",
-    "Stats": "launch",
-    "load_image": "image",
-    "load_mesh": "mesh_files",
-    "load_scene": "scene",
-    "peel": "ldt",
-    "render": "render",
-    "save_image": "image",
-    "set_threads": "launch",
+    "Camera": "scene.description",
+    "Environment": "scene.description",
+    "Frame": "renderer",
+    "Hits": "tracing.trace",
+    "InputError": "base.errors",
+    "LayeredDepthTexture": "ldt.texture",
+    "Light": "scene.description",
+    "Lighting": "scene.description",
+    "MapCache": "files.map_cache",
+    "Material": "scene.description",
+    "Mesh": "scene.mesh",
+    "Object": "scene.description",
+    "Raycaster": "tracing.bvh",
+    "Reflection": "scene.description",
+    "Renderer": "renderer",
+    "Scene": "scene.description",
+    "Stats": "device.launch",
+    "keep_maps_in": "files.map_cache",
+    "load_image": "files.pictures",
+    "load_mesh": "scene.readers.mesh_files",
+    "load_scene": "scene.description",
+    "peel": "ldt.texture",
+    "progress_to": "device.launch",
+    "render": "renderer",
+    "save_image": "files.pictures",
+    "set_memory_limit": "base.budget",
+    "set_threads": "device.launch",
 }
 """Public name -> its module. A module is imported when a name of it is first used: importing all takes a second and a
 half, in which the command line must be able to stop."""
 
 
-def __getattr__(name: str) -> Any:
-    if name in _HOMES:
-        value = getattr(importlib.import_module(f"ldtrefl.{_HOMES[name]}"), name)
-    else:
-        try:
-            value = importlib.import_module(f"ldtrefl.{name}")
-        except ModuleNotFoundError as error:
-            if error.name != f"ldtrefl.{name}":
-                raise
-            raise AttributeError(f"module 'ldtrefl' has no attribute '{name}'") from None
+def __getattr__(name: str) -> object:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'ldtrefl' has no attribute '{name}'")
+    value = getattr(importlib.import_module(f"ldtrefl.{_HOMES[name]}"), name)
     globals()[name] = value
     return value
 
 
 def __dir__() -> list[str]:
     return sorted({*globals(), *__all__})
-
-
-class _Package(ModuleType):
-    """The package: importing the module ``ldtrefl.render`` must not put it in the place of the function."""
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        if name not in _HOMES or not isinstance(value, ModuleType):
-            super().__setattr__(name, value)
-
-
-sys.modules[__name__].__class__ = _Package

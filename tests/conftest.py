@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import ldtrefl
-from ldtrefl import shapes
+from ldtrefl.scene import shapes
 
 SCENES = Path(__file__).parent.parent / "scenes"
 

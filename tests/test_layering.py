@@ -1,6 +1,7 @@
-"""Imports go one way: a module imports only what stands before it here, and no method imports another."""
+"""The house: which room may import which, that imports go one way, and what only one file may know."""
 
 import ast
+import functools
 import re
 from pathlib import Path
 
@@ -10,98 +11,21 @@ import ldtrefl
 from ldtrefl.methods import all_methods
 
 PACKAGE = Path(ldtrefl.__file__).parent
-BOTTOM_TO_TOP = (
-    "errors",
-    "budget",
-    "sharing",
-    "toml_text",
-    "checked",
-    "files",
-    "fingerprint",
-    "npz",
-    "native",
-    "native_sources",
-    "skips",
-    "cache",
-    "warp_abi",
-    "kernel_cache",
-    "python_pool",
-    "crew",
-    "launch",
-    "binning",
-    "pillow_limit",
-    "image",
-    "vectors",
-    "bulk",
-    "pillow_pictures",
-    "welding",
-    "normals",
-    "mesh_passes",
-    "mesh",
-    "polygons",
-    "mesh_polygons",
-    "mesh_memory",
-    "mesh_archives",
-    "reader_words",
-    "mesh_files",
-    "teapot_patches",
-    "shapes",
-    "scene",
-    "camera",
-    "hit",
-    "strays",
-    "device_scene",
-    "unit_rays",
-    "shade",
-    "cubemap",
-    "raster",
-    "fragments",
-    "occupancy",
-    "peel",
-    "pieces",
-    "patches",
-    "doubts",
-    "records_choice",
-    "tree",
-    "tree_check",
-    "tree_build",
-    "items",
-    "trace",
-    "march_linear",
-    "tree_walk",
-    "march",
-    "ldt",
-    "layers",
-    "raycast",
-    "zbuffer",
-    "gbuffer",
-    "rays",
-    "cull",
-    "kept",
-    "resolution",
-    "reflect",
-    "methods.base",
-    "methods",
-    "metrics",
-    "render",
-    "cli",
-    "__main__",
+FLOORS = (
+    ("base", "geometry"),
+    ("files", "device"),
+    ("scene",),
+    ("world",),
+    ("tracing", "shading"),
+    ("ldt", "frame"),
+    ("methods",),
+    ("renderer", "compare"),
+    ("cli",),
+    ("__main__",),
 )
+"""Rooms from the ground up: folders and single files of the package. A room imports rooms of lower floors."""
 
-
-def imported_modules(path: Path) -> set[str]:
-    """Names of the package's modules that a file imports, wherever in the file."""
-    found = set()
-    for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.ImportFrom) and node.module:
-            if node.module == "ldtrefl":
-                found |= {alias.name for alias in node.names}
-            elif node.module.startswith("ldtrefl."):
-                found.add(node.module.removeprefix("ldtrefl."))
-        elif isinstance(node, ast.Import):
-            found |= {a.name.removeprefix("ldtrefl.") for a in node.names if a.name.startswith("ldtrefl.")}
-    return found
-
+FLOOR_OF = {room: number for number, floor in enumerate(FLOORS) for room in floor}
 
 MODULES = sorted(
     str(path.relative_to(PACKAGE).with_suffix("")).replace("/", ".").removesuffix(".__init__")
@@ -115,31 +39,78 @@ def path_of(module: str) -> Path:
     return path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
 
 
+@functools.cache
+def imported_modules(module: str) -> frozenset[str]:
+    """Names of the package's modules that a file imports, wherever in the file."""
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(path_of(module).read_text())):
+        if isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] == "ldtrefl":
+            inside = node.module.removeprefix("ldtrefl").removeprefix(".")
+            names = {f"{inside}.{alias.name}".strip(".") for alias in node.names}
+            found |= {name if name in MODULES else inside for name in names}
+        elif isinstance(node, ast.Import):
+            found |= {alias.name.removeprefix("ldtrefl.") for alias in node.names if alias.name.startswith("ldtrefl.")}
+    return frozenset(found)
+
+
+def room_of(module: str) -> str:
+    return module.split(".", maxsplit=1)[0]
+
+
+def test_every_room_has_a_floor() -> None:
+    assert {room_of(module) for module in MODULES} == set(FLOOR_OF)
+
+
 @pytest.mark.parametrize("module", MODULES)
 def test_imports_go_down(module: str) -> None:
-    is_method = module.startswith("methods.") and module != "methods.base"
-    place = "methods.base" if is_method else module
-    assert place in BOTTOM_TO_TOP, f"{module} has no place in the order"
-    below = set(BOTTOM_TO_TOP[: BOTTOM_TO_TOP.index(place) + is_method])
-    upwards = imported_modules(path_of(module)) - below
-    assert not upwards, f"{module} imports {upwards}, which stand above it"
+    room = room_of(module)
+    upwards = {
+        name for name in imported_modules(module) if room_of(name) != room and FLOOR_OF[room_of(name)] >= FLOOR_OF[room]
+    }
+    assert not upwards, f"{module} imports {upwards}, which stand on its floor or above it"
+
+
+def test_no_files_import_each_other() -> None:
+    done: set[str] = set()
+
+    def visit(module: str, way: tuple[str, ...]) -> None:
+        assert module not in way, f"a circle: {' -> '.join([*way, module])}"
+        if module not in done:
+            for name in imported_modules(module) & set(MODULES):
+                visit(name, (*way, module))
+            done.add(module)
+
+    for module in MODULES:
+        visit(module, ())
+
+
+@pytest.mark.parametrize("module", [module for module in MODULES if module.startswith("methods.")])
+def test_no_method_imports_another(module: str) -> None:
+    assert {name for name in imported_modules(module) if room_of(name) == "methods"} <= {"methods.base"}
 
 
 def test_only_launch_launches() -> None:
-    offenders = [
-        m for m in MODULES if m not in ("python_pool", "crew", "launch") and "wp.launch(" in path_of(m).read_text()
-    ]
-    assert not offenders
+    allowed = ("device.python_pool", "device.cpu_threads", "device.launch")
+    assert not [m for m in MODULES if m not in allowed and "wp.launch(" in path_of(m).read_text()]
 
 
 def test_only_warp_abi_knows_what_is_private_to_warp() -> None:
     private = re.compile(
         r"warp\._src|wp\.Launch\(|\.(hooks|adj|module_exec|__ctype__|_?ctype)\b|command\.params|\"vars\""
     )
-    found = {m: private.findall(path_of(m).read_text()) for m in MODULES if m != "warp_abi"}
+    found = {m: private.findall(path_of(m).read_text()) for m in MODULES if m != "device.warp_abi"}
     assert not any(found.values()), {module: names for module, names in found.items() if names}
 
 
 def test_methods_are_found_by_scanning() -> None:
     files = {m.removeprefix("methods.") for m in MODULES if m.startswith("methods.")} - {"base"}
     assert set(all_methods()) == files
+
+
+ROOMS = [path.parent for path in PACKAGE.glob("*/__init__.py")]
+
+
+@pytest.mark.parametrize("room", ROOMS, ids=lambda room: room.name)
+def test_a_room_says_what_it_is_for(room: Path) -> None:
+    words = ast.get_docstring(ast.parse((room / "__init__.py").read_text())) or ""
+    assert "Imports" in words and "Start with" in words, f"{room.name}: what it imports, and where to start reading"

@@ -10,8 +10,9 @@ import pytest
 import trimesh
 
 import ldtrefl
-from ldtrefl import shapes, skips
+from ldtrefl.frame import skips
 from ldtrefl.methods import all_methods
+from ldtrefl.scene import shapes
 
 ROOT = Path(__file__).parent.parent
 

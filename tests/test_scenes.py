@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import ldtrefl
-from ldtrefl import metrics
+from ldtrefl.compare import metrics
 
 from .conftest import SCENES
 

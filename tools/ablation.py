@@ -25,12 +25,13 @@ import numpy as np
 from timing import in_turn
 
 import ldtrefl
-from ldtrefl import launch, skips
-from ldtrefl.errors import InputError
-from ldtrefl.files import written_whole
-from ldtrefl.reflect import no_shadows, shade_gbuffer
-from ldtrefl.render import Frame, Renderer
-from ldtrefl.scene import Camera, Material, Object, Scene
+from ldtrefl.base.errors import InputError
+from ldtrefl.device import launch
+from ldtrefl.files.whole import written_whole
+from ldtrefl.frame import skips
+from ldtrefl.frame.reflect import no_shadows, shade_gbuffer
+from ldtrefl.renderer import Frame, Renderer
+from ldtrefl.scene.description import Camera, Material, Object, Scene
 
 ROOT = Path(__file__).parent.parent
 SHIPPED = ("teapot", "wall", "bowl_mirror", "torus_mirror", "genus3_knot", "three_genus3")

@@ -39,8 +39,8 @@ from benchmark_parts.threads import thread_scaling
 from benchmark_parts.tracing import Plan, rays_line, rays_on_mesh
 
 import ldtrefl
-from ldtrefl.errors import InputError
-from ldtrefl.files import written_whole
+from ldtrefl.base.errors import InputError
+from ldtrefl.files.whole import written_whole
 
 TRACERS = (*OURS, *RIVALS)
 ALL_TRACERS = ", ".join(tracer.name for tracer in TRACERS)

@@ -15,12 +15,12 @@ from collections.abc import Callable
 import numpy as np
 import warp as wp
 
-from ldtrefl import launch
-from ldtrefl.camera import camera_axes
-from ldtrefl.device_scene import DeviceScene
-from ldtrefl.gbuffer import draw_gbuffer
-from ldtrefl.raycast import Raycaster
-from ldtrefl.scene import Camera, Object, Scene
+from ldtrefl.device import launch
+from ldtrefl.frame.gbuffer import draw_gbuffer
+from ldtrefl.scene.description import Camera, Object, Scene
+from ldtrefl.tracing.bvh import Raycaster
+from ldtrefl.world.camera import camera_axes
+from ldtrefl.world.device_scene import DeviceScene
 
 ROUNDS = 9
 KNOTS = {"10 k": (200, 25), "96 k": (600, 80), "500 k": (2000, 125), "2 M": (5000, 200)}

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 
 import ldtrefl
-from ldtrefl import shapes
-from ldtrefl.layers import draw_layers
+from ldtrefl.compare.layer_picture import draw_layers
+from ldtrefl.scene import shapes
 
 ROOT = Path(__file__).parent.parent
 CROP = (slice(182, 342), slice(288, 528))

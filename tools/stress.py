@@ -21,8 +21,8 @@ from types import ModuleType
 
 from stress_cases.judge import Outcome, as_dict
 
-from ldtrefl.errors import InputError
-from ldtrefl.files import written_whole
+from ldtrefl.base.errors import InputError
+from ldtrefl.files.whole import written_whole
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,7 @@
-"""The reflection methods, one per file, found by scanning this folder: delete a file and its method is gone."""
+"""The reflection methods, one per file, found by scanning this folder: delete a file and its method is gone.
+
+Imports ``frame``, ``ldt`` and what is below them; no method imports another. Start with ``base.py``, the contract.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,7 @@ import importlib
 import pkgutil
 from pathlib import Path
 
-from ldtrefl.errors import unknown_name
+from ldtrefl.base.errors import unknown_name
 from ldtrefl.methods.base import Method
 
 

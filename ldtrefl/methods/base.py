@@ -16,14 +16,14 @@ import warp as wp
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass as pydantic_dataclass
 
-from ldtrefl.device_scene import DeviceMesh, DeviceScene
-from ldtrefl.errors import InputError, first_fault, unknown_name
-from ldtrefl.gbuffer import GBuffer
-from ldtrefl.launch import Stats
-from ldtrefl.raycast import BVH, BvhView, Raycaster
-from ldtrefl.reflect import BoundTracer, FirstHits
-from ldtrefl.skips import Choice, chosen, names
-from ldtrefl.trace import array_of_views
+from ldtrefl.base.errors import InputError, first_fault, unknown_name
+from ldtrefl.device.launch import Stats
+from ldtrefl.frame.gbuffer import GBuffer
+from ldtrefl.frame.reflect import BoundTracer, FirstHits
+from ldtrefl.frame.skips import Choice, chosen, names
+from ldtrefl.tracing.bvh import BVH, BvhView, Raycaster
+from ldtrefl.tracing.trace import array_of_views
+from ldtrefl.world.device_scene import DeviceMesh, DeviceScene
 
 CONFIG = ConfigDict(extra="forbid", use_attribute_docstrings=True)
 """How every method's ``Config`` is checked."""

@@ -15,12 +15,12 @@ from typing import Annotated, Any
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from ldtrefl.cull import not_culled
-from ldtrefl.device_scene import DeviceScene
-from ldtrefl.gbuffer import GBuffer
-from ldtrefl.launch import Stats
+from ldtrefl.device.launch import Stats
+from ldtrefl.frame.gbuffer import GBuffer
+from ldtrefl.frame.reflect import BoundTracer, follow_rays
+from ldtrefl.frame.regions import not_culled
 from ldtrefl.methods.base import CONFIG, CommonConfig, Method, Reflection, Trees
-from ldtrefl.reflect import BoundTracer, follow_rays
+from ldtrefl.world.device_scene import DeviceScene
 
 
 class Bvh(Method):

@@ -18,14 +18,15 @@ import warp as wp
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from ldtrefl import budget, launch
-from ldtrefl.device_scene import DeviceObject, DeviceScene
-from ldtrefl.gbuffer import GBuffer, draw_in_bands
-from ldtrefl.launch import Stats
+from ldtrefl.base import budget
+from ldtrefl.device import launch
+from ldtrefl.device.launch import Stats
+from ldtrefl.frame.gbuffer import GBuffer, draw_in_bands
+from ldtrefl.frame.reflect import BoundTracer, no_shadows, shade_gbuffer
 from ldtrefl.methods.base import CONFIG, CommonConfig, Method, Reflection, Trees
-from ldtrefl.rays import RayBuffer
-from ldtrefl.reflect import BoundTracer, no_shadows, shade_gbuffer
-from ldtrefl.scene import Camera
+from ldtrefl.scene.description import Camera
+from ldtrefl.tracing.rays import RayBuffer
+from ldtrefl.world.device_scene import DeviceObject, DeviceScene
 
 PIXEL_BYTES = 12
 """Of a cube map."""

@@ -9,10 +9,10 @@ from typing import Any
 from timing import timed_in_turn
 
 import ldtrefl
-from ldtrefl import launch
-from ldtrefl.device_scene import DeviceMesh
-from ldtrefl.ldt import peel_mesh
-from ldtrefl.raycast import Raycaster
+from ldtrefl.device import launch
+from ldtrefl.ldt.texture import peel_mesh
+from ldtrefl.tracing.bvh import Raycaster
+from ldtrefl.world.device_scene import DeviceMesh
 
 from .cores import one_core
 from .models import Model

@@ -6,9 +6,10 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from ldtrefl import launch, skips
-from ldtrefl.scene import Camera, Light, Material, Object, Scene
-from ldtrefl.trace import Tracer, array_of_views, batch_kernel, block_of
+from ldtrefl.device import launch
+from ldtrefl.frame import skips
+from ldtrefl.scene.description import Camera, Light, Material, Object, Scene
+from ldtrefl.tracing.trace import Tracer, array_of_views, batch_kernel, block_of
 
 ROOT = Path(__file__).parent.parent.parent
 

@@ -12,9 +12,10 @@ import numpy as np
 from timing import timed_in_turn
 
 import ldtrefl
-from ldtrefl import launch, metrics
-from ldtrefl.render import Renderer
-from ldtrefl.scene import Scene
+from ldtrefl.compare import metrics
+from ldtrefl.device import launch
+from ldtrefl.renderer import Renderer
+from ldtrefl.scene.description import Scene
 
 from .common import ROOT, SKIPS_BUT_FRAMES, knot_scene
 from .paper import PAPER_TABLE_2

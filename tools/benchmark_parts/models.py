@@ -17,7 +17,7 @@ import numpy as np
 import trimesh
 
 import ldtrefl
-from ldtrefl import shapes
+from ldtrefl.scene import shapes
 
 KNOTS = {
     "knot 1 k": (64, 8),

@@ -9,10 +9,10 @@ import numpy as np
 import warp as wp
 
 import ldtrefl
-from ldtrefl import launch
-from ldtrefl.march import TRACERS
-from ldtrefl.raycast import BVH
-from ldtrefl.trace import Tracer
+from ldtrefl.device import launch
+from ldtrefl.ldt.searches import TRACERS
+from ldtrefl.tracing.bvh import BVH
+from ldtrefl.tracing.trace import Tracer
 
 from .common import Batch
 from .ray_tracer import RayTracer

@@ -9,10 +9,11 @@ from typing import Any
 from timing import timed_in_turn
 
 import ldtrefl
-from ldtrefl import launch, shapes
-from ldtrefl.device_scene import DeviceMesh
-from ldtrefl.ldt import peel_mesh
-from ldtrefl.render import Renderer
+from ldtrefl.device import launch
+from ldtrefl.ldt.texture import peel_mesh
+from ldtrefl.renderer import Renderer
+from ldtrefl.scene import shapes
+from ldtrefl.world.device_scene import DeviceMesh
 
 from .common import ROOT, SKIPS_BUT_FRAMES
 from .models import load

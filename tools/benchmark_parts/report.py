@@ -8,7 +8,7 @@ from typing import Any
 import matplotlib
 import numpy as np
 
-from ldtrefl.files import written_whole
+from ldtrefl.files.whole import written_whole
 
 from .models import KNOTS
 from .tables import build_tables, memory_table, number, rays_tables, table

@@ -10,10 +10,11 @@ import warp as wp
 from timing import timed_in_turn
 
 import ldtrefl
-from ldtrefl import launch, shapes
-from ldtrefl.device_scene import DeviceMesh
-from ldtrefl.ldt import peel_mesh
-from ldtrefl.march import TRACERS
+from ldtrefl.device import launch
+from ldtrefl.ldt.searches import TRACERS
+from ldtrefl.ldt.texture import peel_mesh
+from ldtrefl.scene import shapes
+from ldtrefl.world.device_scene import DeviceMesh
 
 from .common import Batch
 from .models import KNOTS

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 import ldtrefl
-from ldtrefl.unit_rays import LEAVING
+from ldtrefl.world.unit_rays import LEAVING
 
 AT_ONCE = 1_000_000
 """Rays traced together: some hundred MB."""

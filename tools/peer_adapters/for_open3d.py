@@ -13,7 +13,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from ldtrefl import shapes
+from ldtrefl.scene import shapes
 
 from .crossings import Crossings, Target
 

@@ -18,8 +18,9 @@ import numpy as np
 import warp as wp
 
 import ldtrefl
-from ldtrefl import shapes, skips
-from ldtrefl.scene import Camera, Environment, Light, Lighting, Material, Object, Scene
+from ldtrefl.frame import skips
+from ldtrefl.scene import shapes
+from ldtrefl.scene.description import Camera, Environment, Light, Lighting, Material, Object, Scene
 
 from .judge import Outcome
 

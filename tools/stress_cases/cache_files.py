@@ -25,10 +25,11 @@ import numpy as np
 import xxhash
 
 import ldtrefl
-from ldtrefl import launch, shapes
-from ldtrefl.cache import HEADER, MAGIC, Entry, MapCache, keep_maps_in
-from ldtrefl.device_scene import DeviceMesh
-from ldtrefl.ldt import peel_mesh
+from ldtrefl.device import launch
+from ldtrefl.files.map_cache import HEADER, MAGIC, Entry, MapCache, keep_maps_in
+from ldtrefl.ldt.texture import peel_mesh
+from ldtrefl.scene import shapes
+from ldtrefl.world.device_scene import DeviceMesh
 
 from .judge import Outcome, rays_about
 

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 
 import ldtrefl
-from ldtrefl import shapes
+from ldtrefl.scene import shapes
 
 from .judge import Limit, Outcome, judge_mesh, limits, linear_limit, rays_about, tracers
 

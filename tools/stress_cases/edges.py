@@ -17,7 +17,7 @@ import trimesh
 from scipy.spatial import cKDTree
 
 import ldtrefl
-from ldtrefl import shapes
+from ldtrefl.scene import shapes
 
 from .edge_truth import LADDER, Right, Surface, examine, what_is_right
 from .judge import TEXELS, Outcome

@@ -26,7 +26,7 @@ import numpy as np
 import OpenImageIO as oiio
 
 import ldtrefl
-from ldtrefl import cli
+from ldtrefl.cli import commands
 
 from . import mutations
 from .judge import Outcome
@@ -264,7 +264,7 @@ def scene_text(thing: str, sky: str = "8.png", texture: str = "8.png") -> str:
 def render(scene: Path, output: Path, *options: str) -> int:
     """The command line in this process, its report unheard."""
     with contextlib.redirect_stdout(io.StringIO()):
-        return cli.main(["render", str(scene), "-o", str(output), "--threads", "1", *options])
+        return commands.main(["render", str(scene), "-o", str(output), "--threads", "1", *options])
 
 
 def read(path: Path) -> np.ndarray | None:

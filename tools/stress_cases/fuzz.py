@@ -10,8 +10,8 @@ from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis import strategies as st
 
 import ldtrefl
-from ldtrefl import shapes
-from ldtrefl.records_choice import FEW_TRIANGLES, Quality
+from ldtrefl.ldt.exact.record_choice import FEW_TRIANGLES, Quality
+from ldtrefl.scene import shapes
 
 from .judge import DENSE, TEXELS, Limit, Outcome, Truth, describe, judge, linear_limit, moved
 

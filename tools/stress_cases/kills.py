@@ -13,9 +13,9 @@ import numpy as np
 import OpenImageIO as oiio
 
 import ldtrefl
-from ldtrefl import shapes
-from ldtrefl.cache import MapCache
-from ldtrefl.image import load_image
+from ldtrefl.files.map_cache import MapCache
+from ldtrefl.files.pictures import load_image
+from ldtrefl.scene import shapes
 
 from .judge import Outcome
 

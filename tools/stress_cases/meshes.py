@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import ldtrefl
-from ldtrefl import shapes
+from ldtrefl.scene import shapes
 
 from .judge import DENSE, TEXELS, Limit, Outcome, judge_mesh, limits, linear_limit, moved, rays_about
 

@@ -24,8 +24,8 @@ import xxhash
 from PIL import Image
 from trimesh.exchange import gltf, obj
 
-from ldtrefl import shapes
-from ldtrefl.cache import HEADER
+from ldtrefl.files.map_cache import HEADER
+from ldtrefl.scene import shapes
 
 Mutation = Callable[[bytes, np.random.Generator], bytes]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ldtrefl import shapes
+from ldtrefl.scene import shapes
 
 from .judge import Limit, Outcome, judge_mesh, limits, linear_limit
 

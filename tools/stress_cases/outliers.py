@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 import ldtrefl
-from ldtrefl import shapes
+from ldtrefl.scene import shapes
 
 from .judge import Outcome, brute_force
 

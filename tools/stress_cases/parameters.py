@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 
 import ldtrefl
-from ldtrefl import shapes
+from ldtrefl.scene import shapes
 
 from .judge import LINEAR, Limit, Outcome, Truth, describe, judge, judge_mesh, limits, linear_limit, moved, rays_about
 

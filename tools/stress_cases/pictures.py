@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 import ldtrefl
-from ldtrefl import shapes
-from ldtrefl.camera import camera_axes
+from ldtrefl.scene import shapes
+from ldtrefl.world.camera import camera_axes
 
 from .judge import LINEAR_WORST, TEXELS, Outcome, Truth
 

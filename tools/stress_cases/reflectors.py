@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import ldtrefl
-from ldtrefl import shapes
+from ldtrefl.scene import shapes
 
 from .judge import Outcome
 from .pictures import Held, judge_reflections, surroundings

@@ -11,8 +11,8 @@ import time
 import numpy as np
 
 import ldtrefl
-from ldtrefl.camera import camera_axes
-from ldtrefl.scene import Camera, Light, Lighting, Material, Object, Scene
+from ldtrefl.scene.description import Camera, Light, Lighting, Material, Object, Scene
+from ldtrefl.world.camera import camera_axes
 
 from .judge import Outcome
 

@@ -1,0 +1,135 @@
+"""How much memory a scene may take: estimated and asked for before anything is allocated.
+
+Small files can ask for much: a picture of one colour, a shape of many segments, an archive. So whoever is about to
+allocate what a file asks for first *takes* that many bytes from the account in use. An account is opened for a scene,
+so that what its files need adds up; outside one, every request stands alone.
+
+The promise for files that nobody has looked at (``SECURITY.md`` has the table by kind of file): loading and rendering
+take no more than the limit, and half a gigabyte for the program itself. The limit is 4 GiB; the environment variable
+``LDTREFL_MEMORY``, ``--memory`` and :func:`set_memory_limit` set another. Estimates are peaks that were measured, so
+that what is taken counts what rendering adds to loading.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import contextvars
+import os
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from ldtrefl.base.errors import InputError
+
+DEFAULT_LIMIT = 4 << 30
+"""Bytes: enough for meshes of ten million triangles, and less than most machines have."""
+
+
+VARIABLE = "LDTREFL_MEMORY"
+"""Environment variable that holds another limit."""
+
+_UNITS = {"": 1, "K": 1 << 10, "M": 1 << 20, "G": 1 << 30, "T": 1 << 40}
+
+
+@dataclass
+class _Limit:
+    value: int | None = None
+    """``None``: the environment's, or else the default."""
+
+
+@dataclass
+class Account:
+    """What has been taken for one scene."""
+
+    taken: int = 0
+    """Bytes."""
+
+
+_limit = _Limit()
+_account: contextvars.ContextVar[Account | None] = contextvars.ContextVar("ldtrefl_account", default=None)
+
+
+def set_memory_limit(limit: int | None = None) -> None:
+    """Let a scene take this many bytes from now on; ``None`` means that of ``LDTREFL_MEMORY``, or else 4 GiB.
+
+    Raises:
+        InputError: not a whole number of at least 1.
+    """
+    if limit is not None:
+        if isinstance(limit, bool) or not hasattr(limit, "__index__") or limit.__index__() < 1:
+            raise InputError(f"the memory limit must be a whole number of bytes, at least 1, got {limit!r}")
+        limit = limit.__index__()
+    _limit.value = limit
+
+
+def memory_limit() -> int:
+    """Bytes that a scene may take.
+
+    Raises:
+        InputError: ``LDTREFL_MEMORY`` counts and holds no size.
+    """
+    if _limit.value is not None:
+        return _limit.value
+    given = os.environ.get(VARIABLE, "")
+    return size_of(given, VARIABLE) if given.strip() else DEFAULT_LIMIT
+
+
+def size_of(text: str, place: str) -> int:
+    """Bytes that "8G", "1.5 GiB", "512M" or "1000000" stand for; units are powers of 1024.
+
+    Args:
+        text: what a person wrote.
+        place: the option or variable that holds it; the message names it.
+
+    Raises:
+        InputError: it is no size of at least one byte.
+    """
+    number = re.fullmatch(r"\s*(\d{1,18}(?:\.\d{1,9})?)\s*([KMGT]?)(?:i?B)?\s*", text, re.IGNORECASE | re.ASCII)
+    count = int(float(number[1]) * _UNITS[number[2].upper()]) if number else 0
+    if count < 1:
+        raise InputError(f"{place}: expected a size such as 8G, 512M or a number of bytes, got '{text[:40]}'")
+    return count
+
+
+@contextlib.contextmanager
+def account() -> Iterator[Account]:
+    """Add up what is taken inside this block; inside another account, that one goes on."""
+    current = _account.get()
+    if current is not None:
+        yield current
+        return
+    current = Account()
+    token = _account.set(current)
+    try:
+        yield current
+    finally:
+        _account.reset(token)
+
+
+def take(needed: float, what: str, smaller: str = "") -> None:
+    """Ask for memory before it is allocated.
+
+    Args:
+        needed: bytes, an estimate.
+        what: what needs it, such as "a picture of 16384 x 16384 pixels".
+        smaller: which key makes it smaller, such as "params.segments"; the message names it.
+
+    Raises:
+        InputError: with what was taken before, it is more than is allowed.
+    """
+    current, limit = _account.get() or Account(), memory_limit()
+    if current.taken + needed > limit:
+        before = f" beside {in_words(current.taken)} for the rest of the scene" if current.taken else ""
+        ways = f"{smaller} or --memory" if smaller else "--memory"
+        raise InputError(
+            f"{what} needs {in_words(needed)}{before}, allowed are {in_words(limit)} ({ways} changes that)"
+        )
+    current.taken += int(needed)
+
+
+def in_words(count: float) -> str:
+    """A number of bytes for people: "1.5 GiB"."""
+    for unit, size in (("GiB", 1 << 30), ("MiB", 1 << 20), ("KiB", 1 << 10)):
+        if count >= size:
+            return f"{count / size:.1f} {unit}"
+    return f"{int(count)} bytes"

@@ -1,0 +1,4 @@
+"""The command line.
+
+Imports everything else. Start with ``commands.py``.
+"""

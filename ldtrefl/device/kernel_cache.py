@@ -1,0 +1,222 @@
+"""Loading kernels: quietly, with a notice where one must be compiled, and whether or not Warp's cache can be written.
+
+Warp keeps compiled kernels in a folder (``WARP_CACHE_PATH``, or ``warp`` in the user's cache folder). Where that cannot
+be written, kernels are compiled into a folder of this process, which is removed at its end.
+"""
+
+from __future__ import annotations
+
+import atexit
+import logging
+import os
+import shutil
+import tempfile
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
+from pathlib import Path
+
+import warp as wp
+
+from ldtrefl.base.errors import InputError
+from ldtrefl.base.standard_error import caught_stderr
+from ldtrefl.device import warp_abi
+
+ROOM = 4 << 20
+"""Bytes that must fit into the folder before a kernel is compiled: all kernels of a render take 1 MB. Warp's compiler
+leaves broken files where a disk is full, or ends the process."""
+
+NOTICE = "compiling kernels for the first time, which takes up to half a minute (they are kept in {})"
+"""Measured: 4 s for `peel`, 16 s for a render, twice that where another program has a core."""
+
+_log = logging.getLogger("ldtrefl")
+
+
+class _State:
+    """What one process shares, under ``lock``."""
+
+    def __init__(self) -> None:
+        self.lock = threading.RLock()
+        self.loaded: set[tuple[wp.Kernel, str]] = set()
+        self.is_started = False
+        self.is_announced = False
+        self.is_checked = False  # whether Warp's own folder has been found good or bad
+        self.own_folder: Path | None = None  # kernels go here if Warp's folder is bad
+        self.own_process = 0  # that made it, and removes it
+        self.log_level: int | None = None  # Warp's own, while it is kept quiet
+
+
+_state = _State()
+
+
+def _after_fork_in_child() -> None:
+    # The thread that held the lock does not exist here, and the parent removes its folder when it ends.
+    _state.lock = threading.RLock()
+    _state.own_folder, _state.is_checked = None, False
+    if _state.log_level is not None:
+        wp.config.log_level, _state.log_level = _state.log_level, None
+
+
+os.register_at_fork(after_in_child=_after_fork_in_child)
+
+
+def start_warp() -> None:
+    """Initialise Warp, once.
+
+    Raises:
+        InputError: there is no folder that compiled kernels can be written to.
+    """
+    with _state.lock:
+        if _state.is_started:
+            return
+        asked = wp.config.kernel_cache_dir
+        with _quiet(), caught_stderr():
+            try:
+                wp.init()
+            except OSError as error:
+                if not wp.config.kernel_cache_dir or wp.config.kernel_cache_dir == asked:
+                    raise
+                # Warp does not start without its folder. For its own name it would append its version once more.
+                _compile_elsewhere(wp.config.kernel_cache_dir, _reason(error))
+                wp.config.kernel_cache_dir = str(_state.own_folder)
+                wp.init()
+        _state.is_started = True
+
+
+def load(kernel: wp.Kernel, device: wp.Device) -> None:
+    """Have a kernel ready on a device; compile it if Warp's cache does not hold it.
+
+    Raises:
+        InputError: it must be compiled, and no folder can be written.
+    """
+    key = (kernel, device.alias)
+    if key in _state.loaded:
+        return
+    with _state.lock, _quiet():
+        if key in _state.loaded:
+            return
+        is_compiled = warp_abi.is_compiled(kernel, device)
+        if not is_compiled:
+            _check_folder()
+        if is_compiled is False and not _state.is_announced:
+            _state.is_announced = True
+            _log.info(NOTICE.format(_state.own_folder or wp.config.kernel_cache_dir))
+        if is_compiled or _state.own_folder is None:
+            try:
+                # Of a damaged file LLVM says in its own words what is wrong.
+                with caught_stderr() if is_compiled else nullcontext():
+                    _load(kernel, device)
+            except Exception as error:
+                # A damaged file, or a folder that has become full: once more, elsewhere.
+                if not is_compiled and not isinstance(error, OSError) and _has_room(wp.config.kernel_cache_dir):
+                    raise
+                warp_abi.forget_failure(kernel)
+                _compile_elsewhere(wp.config.kernel_cache_dir, _reason(error))
+                _load_elsewhere(kernel, device)
+        else:
+            _load_elsewhere(kernel, device)
+        _state.loaded.add(key)
+
+
+def folders() -> list[Path]:
+    """The folders that hold the kernels which are loaded."""
+    known = [_state.own_folder, wp.config.kernel_cache_dir]
+    return [Path(folder) for folder in known if folder is not None]
+
+
+def _load(kernel: wp.Kernel, device: wp.Device) -> None:
+    wp.load_module(kernel.module, device=device, max_workers=0)
+
+
+def _load_elsewhere(kernel: wp.Kernel, device: wp.Device) -> None:
+    """Load a kernel by way of our own folder; Warp's folder is as it was afterwards."""
+    before = wp.config.kernel_cache_dir
+    wp.config.kernel_cache_dir = str(_state.own_folder)
+    try:
+        _load(kernel, device)
+    finally:
+        wp.config.kernel_cache_dir = before
+
+
+def _check_folder() -> None:
+    """Find out, once, whether Warp's folder can take what is compiled."""
+    if _state.is_checked or _state.own_folder is not None:
+        return
+    try:
+        _write_probe(Path(wp.config.kernel_cache_dir))
+    except OSError as error:
+        _compile_elsewhere(wp.config.kernel_cache_dir, _reason(error))
+    _state.is_checked = True
+
+
+def _has_room(folder: str) -> bool:
+    try:
+        _write_probe(Path(folder))
+    except OSError:
+        return False
+    return True
+
+
+def _write_probe(folder: Path) -> None:
+    """Write ``ROOM`` bytes into a file of a folder, and remove it.
+
+    Raises:
+        OSError: they cannot be written.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryFile(dir=folder) as probe:
+        probe.write(bytes(ROOM))
+        probe.flush()
+        os.fsync(probe.fileno())
+
+
+def _compile_elsewhere(folder: str, reason: str) -> None:
+    """Make a folder of our own for kernels in place of Warp's, and say so."""
+    if _state.own_folder is not None:
+        return
+    made = None
+    try:
+        made = Path(tempfile.mkdtemp(prefix="ldtrefl-kernels-"))
+        _write_probe(made)
+    except OSError as error:
+        if made is not None:
+            shutil.rmtree(made, ignore_errors=True)
+        raise InputError(
+            f"compiled kernels cannot be kept in {folder} ({reason}), nor in a temporary folder ({_reason(error)}); "
+            f"set WARP_CACHE_PATH to a folder with {ROOM >> 20} MB of room"
+        ) from error
+    _state.own_folder, _state.own_process = made, os.getpid()
+    atexit.register(_remove, made, _state.own_process)
+    _state.is_announced = True
+    _log.warning(
+        f"the kernel cache {folder} cannot be used ({reason}): kernels are compiled for this run alone, which takes up "
+        "to half a minute; mend that folder, or set WARP_CACHE_PATH to another"
+    )
+
+
+def _remove(folder: Path, process: int) -> None:
+    if os.getpid() == process:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _reason(error: Exception) -> str:
+    words = error.strerror if isinstance(error, OSError) and error.strerror else str(error) or type(error).__name__
+    return " ".join(words.split())
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Have Warp say nothing short of errors inside this block: it greets and reports every kernel on standard output.
+
+    Whoever has set another level than Warp's default hears what they asked for. The lock is held by the caller.
+    """
+    if wp.config.log_level != wp.LOG_INFO:
+        yield
+        return
+    _state.log_level, wp.config.log_level = wp.config.log_level, wp.LOG_ERROR
+    try:
+        yield
+    finally:
+        if wp.config.log_level == wp.LOG_ERROR:
+            wp.config.log_level = _state.log_level
+        _state.log_level = None

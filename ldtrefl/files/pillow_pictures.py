@@ -1,0 +1,65 @@
+"""Pictures that the readers of mesh files hand over, as Pillow opened them -> stored pictures (``image.py``)."""
+
+from __future__ import annotations
+
+import weakref
+from typing import Any
+
+import numpy as np
+import xxhash
+from PIL import Image
+
+from ldtrefl.base import budget
+from ldtrefl.base.errors import InputError
+from ldtrefl.files.pictures import linear_from_srgb
+
+BYTES_A_PIXEL = 4 + 4 + 3
+"""What Pillow takes to unpack a picture, what trimesh does to copy it, and what is kept of it."""
+
+ROWS_AT_ONCE = 256
+
+_by_content: weakref.WeakValueDictionary[bytes, np.ndarray] = weakref.WeakValueDictionary()
+
+
+def picture_of(material: Any) -> Image.Image | None:
+    """The picture of a mesh file's base colour; None without one."""
+    return getattr(material, "baseColorTexture", None) or getattr(material, "image", None)
+
+
+def take_pictures(materials: list[Any]) -> None:
+    """Ask for the memory of the pictures of materials, of each as often as it is there, before any is unpacked.
+
+    Raises:
+        InputError: it is more than is allowed.
+    """
+    for picture in map(picture_of, materials):
+        if picture is not None:
+            width, height = picture.size
+            what = f"a texture of {width} x {height} pixels"
+            budget.take(width * height * BYTES_A_PIXEL, what, "a smaller texture")
+
+
+def stored_from_pillow(picture: Image.Image) -> np.ndarray:
+    """``(h, w, 3)`` uint8, sRGB, or float32, linear, of pictures of more than 8 bits. It is not to be changed.
+
+    Alpha is left out, and colours are not multiplied by it. Pictures that are the same share one array.
+
+    Raises:
+        InputError: the picture is cut off or damaged.
+    """
+    width, height = picture.size
+    is_deep = picture.mode.startswith("I")  # Pillow would clip, not scale, its 16 bits
+    stored = np.empty((height, width, 3), np.float32 if is_deep else np.uint8)
+    try:
+        for top in range(0, height, ROWS_AT_ONCE):
+            rows = picture.crop((0, top, width, min(top + ROWS_AT_ONCE, height)))
+            into = stored[top : top + ROWS_AT_ONCE]
+            if is_deep:
+                into[:] = linear_from_srgb(np.asarray(rows, np.float32)[..., None] / 65535.0)
+            else:
+                into[:] = np.asarray(rows.convert("RGBA" if "transparency" in picture.info else "RGB"))[..., :3]
+    except Exception as error:  # whatever a damaged picture provokes in a reader is the picture's fault
+        raise InputError(f"a texture is cut off or damaged ({error})") from error
+    stored.flags.writeable = False
+    key = xxhash.xxh3_128_digest(f"{stored.dtype} {stored.shape}".encode() + xxhash.xxh3_128_digest(stored.data))
+    return _by_content.setdefault(key, stored)

@@ -1,0 +1,97 @@
+"""How much of an object a pixel covers where its reflected ray passes: the *footprint* of the ray.
+
+A pixel's reflected ray and its neighbours' are some distance apart where they pass an object. That distance follows
+from the size of the reflection on the screen, the length of the ray, and the reflector's curvature.
+
+What is found depends on the frame alone: not on frames before, and not on what is skipped.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ldtrefl.frame.gbuffer import GBuffer
+from ldtrefl.frame.regions import Culled
+from ldtrefl.tracing.rays import RayBuffer, distance_across, rays_of, run_count
+from ldtrefl.world.device_scene import DeviceObject
+
+FINEST = 5.0
+"""Percentile of an object's footprints that stands for all of them."""
+
+CANDIDATES = 65_536
+"""Rays of a frame that are tried for whether they meet an object."""
+
+SAMPLES = 4096
+"""Rays per object, of those that meet it, that are looked at."""
+
+SURELY = 0.9999
+"""Of a bounding sphere's radius what a ray must meet to count: whoever culls by the whole of it has kept that ray."""
+
+
+def footprint(rays: RayBuffer, width: int, runs: np.ndarray, entry: DeviceObject) -> float | None:
+    """Distance between neighbouring pixels' rays at an object, device units; None if no two neighbours meet its sphere.
+
+    Args:
+        rays: a ``RayBuffer``.
+        width: pixels in a row of the image.
+        runs: (m,) numbers of the runs of rays that may meet the object.
+    """
+    pixel, source = rays.pixel.numpy(), rays.source.numpy()
+    origin, direction = rays.origin.numpy(), rays.direction.numpy()
+    numbers = rays_of(runs, len(pixel))
+    # Which rays are looked at must not depend on the runs that others are left out in.
+    numbers = numbers[numbers % max(1, len(pixel) // CANDIDATES) == 0]
+    numbers = numbers[(source[numbers] >= 0) & (source[numbers] != entry.index)]
+    offset = np.array(entry.record.centre, np.float32) - origin[numbers]
+    along = (offset * direction[numbers]).sum(axis=1)
+    meets = (along > 0.0) & ((offset**2).sum(axis=1) - along**2 <= (SURELY * float(entry.record.radius)) ** 2)
+    numbers = numbers[meets]
+    numbers = numbers[:: max(1, len(numbers) // SAMPLES)]
+    o, d = origin[numbers].astype(float), direction[numbers].astype(float)
+    along = ((np.array(entry.record.centre, float) - o) * d).sum(axis=1)
+    apart = np.full((2, len(numbers)), np.nan)
+    # In a block of 8 x 8 pixels the next ray is the pixel to the right, the eighth the one below.
+    for row, (step, to_pixel) in zip(apart, ((1, 1), (8, width)), strict=True):
+        beside = np.minimum(numbers + step, len(pixel) - 1)
+        pair = (pixel[beside] == pixel[numbers] + to_pixel) & (source[beside] == source[numbers])
+        row[pair] = distance_across(o, d, origin[beside], direction[beside], along)[pair]
+    both = np.sqrt(apart[0] * apart[1])
+    both = both[np.isfinite(both) & (both > 0.0)]
+    return float(np.percentile(both, FINEST)) if len(both) else None
+
+
+def pixel_spacing(gbuffer: GBuffer) -> float | None:
+    """Distance between neighbouring pixels on what the camera sees, device units; None if it sees nothing."""
+    camera = gbuffer.view.camera
+    seen = np.flatnonzero(gbuffer.view.object.numpy() >= 0)
+    seen = seen[:: max(1, len(seen) // SAMPLES)]
+    if len(seen) == 0:
+        return None
+    offset = gbuffer.surfaces[0].numpy()[seen].astype(float) - np.array(camera.eye, float)
+    depth = float(np.percentile(offset @ np.array(camera.forward, float), FINEST))
+    return 2.0 * depth * float(np.linalg.norm(np.array(camera.down, float))) / camera.height
+
+
+def finest_footprints(gbuffer: GBuffer, rays: RayBuffer, culled: Culled, *, is_seen: bool) -> dict[int, float | None]:
+    """Number of an object -> the smallest footprint on it, device units; None where none is known.
+
+    Args:
+        rays: a bounce's.
+        culled: which objects they can meet; the others are left out.
+        is_seen: whether what the camera itself sees counts, too; then no object is left out.
+    """
+    bits = culled.regions.bits.numpy()
+    by_runs = len(bits) > 0 and culled.regions.rows.shape[0] == 0
+    every_run = np.arange(run_count(rays.pixel.shape[0]))
+    spacing = pixel_spacing(gbuffer) if is_seen else None
+    finest: dict[int, float | None] = {}
+    for entry in gbuffer.scene.objects:
+        is_shown = entry.index in culled.shown
+        if not is_shown and not is_seen:
+            continue
+        apart = [spacing]
+        if is_shown:
+            runs = np.flatnonzero(bits[:, entry.index // 32] >> entry.index % 32 & 1) if by_runs else every_run
+            apart.append(footprint(rays, gbuffer.camera.width, runs, entry))
+        finest[entry.index] = min((distance for distance in apart if distance is not None), default=None)
+    return finest

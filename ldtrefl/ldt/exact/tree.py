@@ -1,0 +1,133 @@
+"""The tree over an object's surfaces that the exact search goes down, eight boxes at a time.
+
+*Records* are what a ray can meet. A record is a *triangle* of the mesh, its three corners as they are, or a *patch*: a
+fragment's texel lifted to its plane, kept in the maps whose axis it faces, the plane and the middle of the texel.
+Triangles where they are larger than texels, patches where many share a texel: the cost of a search stays, whatever the
+mesh. Up to eight records of a kind make a *block*, whose rows hold one number of each of the eight; what is unused is
+NaN, which no ray meets.
+
+A *node* holds the boxes about up to eight blocks or other nodes: per axis eight lows, then eight highs, then the
+numbers of what lies in them, as ``tree_walk.h`` reads them. Node 0 is the root; parts have larger numbers.
+
+All in the object's unit space. Boxes are widened by the rounding of what a ray computes of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from ldtrefl.device import warp_abi
+from ldtrefl.world.device_scene import DeviceMesh
+from ldtrefl.world.strays import Strays
+
+LANES = wp.constant(8)
+"""Records in a block, and children of a node: the width of AVX2."""
+TRIANGLE_ROWS = wp.constant(10)
+"""Rows of a block of triangles: three corners; the bits of its number."""
+PATCH_ROWS = wp.constant(8)
+"""Rows of a block of patches: the plane's n and n . p; the middle of the texel; the bits of the triangle's number; the
+axis of its map, and ``LARGE_AXIS``."""
+NODE = wp.constant(56)
+"""Numbers of a node: six sides of eight boxes, and the bits of eight children."""
+LARGE_AXIS = wp.constant(0.5)
+"""Added to the axis of a patch whose triangle is larger than its texel: the barycentrics of a hit are then looked for,
+while of a small triangle any of its points will do."""
+STACK = 256
+"""Children that a ray has yet to come back to, at most."""
+
+BOX_MARGIN = 4.0e-7
+"""Unit space: by how much boxes are widened. Three roundings of coordinates up to 1, of the box's sides, of the ray's
+start, and of a product."""
+
+ALIGNMENT = 64
+"""Bytes of a cache line."""
+
+
+@wp.struct
+class TreeView:
+    """A tree and its mesh."""
+
+    nodes: wp.array(dtype=wp.float32)
+    rows: wp.array(dtype=wp.float32)
+    low: wp.vec3  # the box about all records
+    high: wp.vec3
+    front: float  # side of the records that can be seen from outside, 1 or -1 along their normals; 0 if not known
+    half_patch: float  # half the side of a patch in its map; 0 if there is none
+    horizon: float  # how far past a doubted hit a search goes on
+    in_turn: int  # 1: larger than a cache, so that rays that do not stay together are searched for in turn
+    vertices: wp.array(dtype=wp.vec3)
+    faces: wp.array(dtype=wp.vec3i)
+    strays: Strays  # what lies far outside, and not in the tree
+
+
+_ARRAYS = ("nodes", "rows")
+_VECTORS = ("low", "high")
+_NUMBERS = ("front", "half_patch", "horizon")
+
+CACHED_BYTES = 12 << 20
+"""Of a tree up to which rays that do not stay together are searched for one by one. In turn they take as long on a scan
+of 100,000 triangles (5.5 MB), a fifth longer on boxes of all sizes (11 MB), and two thirds as long in 25 MB."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tree:
+    """A tree on a device."""
+
+    view: Any
+    """The ``TreeView``."""
+    records: int
+    """Triangles and patches."""
+
+    @property
+    def patches(self) -> bool:
+        """Whether patches stand for triangles."""
+        return self.view.half_patch > 0.0
+
+    def packed(self) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+        """(arrays, values) that :meth:`unpacked` makes the same tree from, the mesh left out."""
+        arrays = {name: getattr(self.view, name).numpy() for name in _ARRAYS}
+        values: dict[str, Any] = {name: [float(x) for x in getattr(self.view, name)] for name in _VECTORS}
+        values |= {name: float(getattr(self.view, name)) for name in _NUMBERS}
+        return arrays, {**values, "records": int(self.records)}
+
+    @classmethod
+    def unpacked(cls, arrays: dict[str, np.ndarray], values: dict[str, Any], geometry: DeviceMesh) -> Tree:
+        """The tree of a mesh on a device from what :meth:`packed` gave.
+
+        What comes from a file is checked first (``tree_check.py``).
+        """
+        device = geometry.vertices.device
+        view = TreeView()
+        view.nodes, view.rows = (aligned_empty(arrays[name].size, device) for name in _ARRAYS)
+        for name in _ARRAYS:
+            getattr(view, name).assign(arrays[name])
+        for name in _VECTORS:
+            setattr(view, name, wp.vec3(*values[name]))
+        for name in _NUMBERS:
+            setattr(view, name, values[name])
+        return cls.of(view, values["records"], geometry)
+
+    @classmethod
+    def of(cls, view: Any, records: int, geometry: DeviceMesh) -> Tree:
+        """The tree of a view that lacks its mesh."""
+        view.vertices, view.faces, view.strays = geometry.vertices, geometry.faces, geometry.strays
+        made = cls(view, records)
+        view.in_turn = int(made.nbytes > CACHED_BYTES)
+        return made
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes that the tree takes, the mesh not counted."""
+        return sum(warp_abi.array_bytes(getattr(self.view, name)) for name in _ARRAYS)
+
+
+def aligned_empty(count: int, device: wp.Device) -> wp.array:
+    """(count,) float32 that begins with a cache line, so that no eight of them lie in two."""
+    spare = ALIGNMENT // 4
+    room = wp.empty(count + spare, dtype=wp.float32, device=device)
+    first = -room.ptr % ALIGNMENT // 4
+    return room[first : first + count]

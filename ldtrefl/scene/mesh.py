@@ -1,0 +1,164 @@
+"""Triangle meshes: checked, and brought to the unit cube.
+
+Vertices are ``(n, 3)`` float64 in the object's own coordinates, faces ``(m, 3)`` int32 in the order of the file: a
+triangle's number means the same to the mesh, the ray caster and the layered depth texture.
+"""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ldtrefl.base.errors import InputError
+from ldtrefl.scene.bulk import split_strays
+from ldtrefl.scene.mesh_passes import copied_faces, copied_vertices, fitted_vertices, is_constant
+from ldtrefl.scene.normals import vertex_normals
+
+MAX_TRIANGLES = 1 << 30
+"""Triangle numbers are int32 and a fragment keeps one bit of it for the facing."""
+
+MOST_VERTICES = (1 << 31) - 1
+"""Vertices are numbered by int32."""
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A run of triangles with one look: a material of the mesh's file."""
+
+    first_triangle: int = 0
+    color: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    """Linear base colour, times the scene's albedo."""
+    texture: np.ndarray | None = None
+    """``(h, w, 3)`` uint8, sRGB, or float32, linear, row 0 at v = 1; None without one. It is not to be changed."""
+
+
+class Mesh:
+    """A checked triangle mesh. Its arrays are read-only: what is made of them is kept.
+
+    They are copies of those given. Only an array of the right type that is read-only, as is all that it is a view of,
+    is taken as it is: such as another mesh's.
+
+    Raises:
+        InputError: no triangles, an index out of range, a vertex that is not finite, or shapes that do not fit.
+    """
+
+    def __init__(
+        self,
+        vertices: Any,
+        faces: Any,
+        normals: Any = None,
+        uvs: Any = None,
+        parts: tuple[Part, ...] = (Part(),),
+    ) -> None:
+        given, corners = _coordinates(vertices), _indices(faces)
+        for count, most, what in ((len(corners), MAX_TRIANGLES, "triangles"), (len(given), MOST_VERTICES, "vertices")):
+            if count > most:
+                raise InputError(f"the mesh has {count} {what}, at most {most} allowed")
+        if len(corners) == 0:
+            raise InputError("the mesh has no triangles")
+        self.faces, self.is_used, wrong = copied_faces(corners, len(given))
+        """(m, 3) int32; (n,) bool: vertices that a triangle has."""
+        if wrong is not None:
+            raise InputError(
+                f"triangle {wrong} has vertices {corners[wrong].tolist()}, allowed are 0 to {len(given) - 1}"
+            )
+        self.vertices, self.bounds, wrong = copied_vertices(given, self.is_used)
+        """(n, 3) float64; (2, 3) float64: the lowest and highest corner of the triangles' box (unused vertices left
+        out)."""
+        if wrong is not None:
+            raise InputError(f"vertex {wrong} is not finite or too large: {given[wrong].tolist()}")
+        if normals is not None:
+            self.normals = _array(normals, np.float32, 3, "normals")
+        self.uvs = None if uvs is None else _array(uvs, np.float32, 2, "uvs")
+        """(n, 2) float32 texture coordinates, v = 0 at the bottom row."""
+        self.parts = parts
+        for name, values in (("normals", None if normals is None else self.normals), ("uvs", self.uvs)):
+            if values is not None and len(values) != len(self.vertices):
+                raise InputError(f"{len(values)} {name} for {len(self.vertices)} vertices")
+        for array in (self.vertices, self.faces, self.is_used, self.bounds):
+            array.flags.writeable = False
+
+    @functools.cached_property
+    def normals(self) -> np.ndarray:
+        """(n, 3) float32 shading normals; made from the faces, when they are first asked for, if none were given."""
+        return _read_only(vertex_normals(self.vertices, self.faces))
+
+    @functools.cached_property
+    def _split(self) -> tuple[np.ndarray, np.ndarray]:
+        return split_strays(self.vertices, self.faces, self.bounds)
+
+    @property
+    def strays(self) -> np.ndarray:
+        """(k,) int32: the few triangles far outside the bulk, most often none."""
+        return self._split[0]
+
+    @property
+    def bulk(self) -> np.ndarray:
+        """(2, 3) float64: the lowest and highest corner of the box about all triangles but the strays."""
+        return self._split[1]
+
+    @functools.cached_property
+    def unit_frame(self) -> tuple[np.ndarray, float]:
+        """``(centre, half)``: ``(v - centre) / half`` fills -1..1 along the longest side of the bulk's box."""
+        low, high = self.bulk
+        half = float((high - low).max()) / 2.0
+        return _read_only(low + (high - low) / 2.0), half if half > 0.0 else 1.0
+
+    @functools.cached_property
+    def unit_vertices(self) -> np.ndarray:
+        """(n, 3) float32 in the unit frame. The shift is done in float64, so a far-off mesh loses nothing."""
+        centre, half = self.unit_frame
+        return _read_only(fitted_vertices(self.vertices, centre, half))
+
+
+def _read_only(array: np.ndarray) -> np.ndarray:
+    array.flags.writeable = False
+    return array
+
+
+def _array(values: Any, dtype: type, width: int, name: str) -> np.ndarray:
+    """(n, width) read-only: the values themselves if nobody changes them, or else a copy."""
+    if isinstance(values, np.ndarray) and is_constant(values, dtype):
+        return _shaped(np.asarray(values), width, name)
+    try:
+        array: np.ndarray = np.array(values, dtype, order="C")
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{name} must be numbers of shape (n, {width}), got {type(values).__name__}") from error
+    return _read_only(_shaped(array, width, name))
+
+
+def _shaped(array: np.ndarray, width: int, name: str) -> np.ndarray:
+    if array.ndim != 2 or array.shape[1] != width:
+        raise InputError(f"{name} must have shape (n, {width}), got {array.shape}")
+    return array
+
+
+def _is_one_of(array: np.ndarray, *dtypes: type) -> bool:
+    """Whether kernels can read an array of one of these types where it lies."""
+    return array.dtype in dtypes and array.flags.aligned
+
+
+def _coordinates(values: Any) -> np.ndarray:
+    """(n, 3) float32 or float64, not copied if it is that."""
+    if isinstance(values, np.ndarray) and _is_one_of(values, np.float32, np.float64):
+        return _shaped(np.asarray(values), 3, "vertices")
+    return _array(values, np.float64, 3, "vertices")
+
+
+def _indices(values: Any) -> np.ndarray:
+    """(m, 3) int32 or int64, not copied if it is that."""
+    try:
+        array = np.asarray(values)
+        if array.size == 0:
+            return np.zeros((0, 3), np.int64)
+        if array.dtype.kind not in "iu":
+            whole = array.astype(np.int64)
+            if not np.array_equal(whole, array):
+                raise ValueError
+            array = whole
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError("faces must be whole numbers of shape (m, 3)") from error
+    return _shaped(array if _is_one_of(array, np.int32, np.int64) else array.astype(np.int64), 3, "faces")

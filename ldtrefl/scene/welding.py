@@ -1,0 +1,76 @@
+"""Welding: which rows of numbers are equal, bit by bit.
+
+A hash sorts the rows into chains, and along a chain they are compared: nothing is rounded, and nothing depends on the
+hash but the time.
+"""
+
+from __future__ import annotations
+
+import secrets
+
+import numpy as np
+import warp as wp
+
+from ldtrefl.device import launch
+
+
+@wp.func
+def mixed(value: wp.uint64, more: wp.uint64):
+    """A hash of two numbers (the finaliser of SplitMix64)."""
+    x = (value ^ more) * wp.uint64(0x9E3779B97F4A7C15)
+    x = (x ^ (x >> wp.uint64(30))) * wp.uint64(0xBF58476D1CE4E5B9)
+    x = (x ^ (x >> wp.uint64(27))) * wp.uint64(0x94D049BB133111EB)
+    return x ^ (x >> wp.uint64(31))
+
+
+@launch.kernel
+def find_firsts(
+    first: int,
+    # In:
+    keys: wp.array2d(dtype=wp.uint64),
+    seed: wp.uint64,
+    mask: wp.uint64,  # number of chains - 1
+    # Out:
+    chains_out: wp.array(dtype=wp.int32),  # first row of each chain of different rows
+    next_out: wp.array(dtype=wp.int32),  # the next row of its chain
+    firsts_out: wp.array(dtype=wp.int32),
+):
+    i = first + wp.tid()
+    hashed = seed
+    for j in range(keys.shape[1]):
+        hashed = mixed(hashed, keys[i, j])
+    chain = int(hashed & mask)
+    found = int(-1)
+    k = int(chains_out[chain])
+    while k >= 0 and found < 0:
+        differences = wp.uint64(0)
+        for j in range(keys.shape[1]):
+            differences = differences | (keys[i, j] ^ keys[k, j])
+        if differences == wp.uint64(0):
+            found = k
+        k = next_out[k]
+    if found < 0:
+        next_out[i] = chains_out[chain]
+        chains_out[chain] = i
+        found = i
+    firsts_out[i] = found
+
+
+def first_of_equals(rows: np.ndarray) -> np.ndarray | None:
+    """(n,) int32: the first row that is equal to each of (n, k) float64; None if no two are.
+
+    -0 is equal to 0.
+    """
+    device = launch.resolve_device("cpu")
+    count = len(rows)
+    keys = np.ascontiguousarray(rows + 0.0).view(np.uint64)  # adding 0 makes -0 a 0
+    chains = 1 << max(2 * count - 1, 1).bit_length()
+    # A secret seed, so that no file can be made whose rows all fall into one chain.
+    seed = wp.uint64(secrets.randbits(64))
+    heads = wp.full(chains, -1, dtype=wp.int32, device=device)
+    following = wp.empty(count, dtype=wp.int32, device=device)
+    firsts = wp.empty(count, dtype=wp.int32, device=device)
+    shared = wp.array(keys, dtype=wp.uint64, device=device, copy=False)
+    launch.launch_in_order(find_firsts, count, [shared, seed, wp.uint64(chains - 1), heads, following, firsts], device)
+    found = firsts.numpy()
+    return None if np.array_equal(found, np.arange(count, dtype=np.int32)) else found

@@ -1,0 +1,47 @@
+"""Every kernel compiles for CUDA; no GPU is needed for that. None has constants that a compiler must warn of."""
+
+import re
+from pathlib import Path
+
+import pytest
+import warp as wp
+
+from ldtrefl.device import launch
+from ldtrefl.frame.reflect import (
+    NOTHING,
+    closest_hits_kernel,
+    shade_hits_kernel,
+    shade_pixels_kernel,
+    shade_reflectors_kernel,
+)
+from ldtrefl.ldt.searches import TRACERS
+from ldtrefl.renderer import Renderer  # noqa: F401  (imports every module that defines kernels)
+from ldtrefl.tracing.bvh import BVH
+from ldtrefl.tracing.trace import batch_kernel
+
+
+def all_kernels() -> list[wp.Kernel]:
+    for tracer in (BVH, *TRACERS.values()):
+        batch_kernel(tracer, 1)
+        batch_kernel(tracer, 1, True)
+        closest_hits_kernel(tracer, 1)
+    for tracer in (NOTHING, BVH, *TRACERS.values()):
+        shade_hits_kernel(tracer)
+        shade_pixels_kernel(tracer)
+        shade_reflectors_kernel(tracer)
+    return [kernel for kernel in launch.KERNELS if kernel.func.__module__.startswith("ldtrefl.")]
+
+
+def test_kernels_are_found() -> None:
+    assert len({kernel.module.name for kernel in all_kernels()}) >= 40
+
+
+@pytest.mark.parametrize("kernel", all_kernels(), ids=lambda kernel: kernel.module.name)
+def test_kernel_compiles_to_ptx(kernel: wp.Kernel, tmp_path: Path) -> None:
+    launch.resolve_device(None)
+    wp.compile_aot_module(kernel.module, arch=86, module_dir=tmp_path, use_ptx=True)
+    made = list(tmp_path.rglob("*.ptx"))
+    assert made and all(b".entry" in path.read_bytes() for path in made)
+    (source,) = tmp_path.rglob("*.cu")
+    numbers = re.findall(r"wp::int32 \w+ = (-?\d+);", source.read_text())
+    assert all(-(2**31) <= int(number) < 2**31 for number in numbers), numbers

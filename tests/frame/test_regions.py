@@ -1,0 +1,177 @@
+"""Reflection regions: the paper's cone test and ours against brute force in float64, and the pictures."""
+
+import numpy as np
+import pytest
+import warp as wp
+
+import ldtrefl
+from ldtrefl.device import launch
+from ldtrefl.frame.regions import cull_runs, shows_flat
+from ldtrefl.scene.description import Camera, Material, Object, Scene
+from ldtrefl.tracing.rays import RUN, RayBuffer
+from ldtrefl.world.device_scene import ObjectRecord
+
+from .conftest import SCENES
+
+SPHERES = 50
+"""Objects that every run of rays is tested against."""
+
+
+@launch.kernel
+def answer_flat(
+    first: int,
+    eye: wp.array(dtype=wp.vec3),
+    corners: wp.array2d(dtype=wp.vec3),
+    centre: wp.array(dtype=wp.vec3),
+    radius: wp.array(dtype=float),
+    flat_out: wp.array(dtype=int),
+):
+    i = first + wp.tid()
+    flat_out[i] = int(shows_flat(eye[i], corners[i, 0], corners[i, 1], corners[i, 2], centre[i], radius[i]))
+
+
+def unit(vectors: np.ndarray) -> np.ndarray:
+    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+
+
+def on_device(vectors: np.ndarray) -> wp.array:
+    return wp.array(vectors.astype(np.float32), dtype=wp.vec3, device=launch.resolve_device(None))
+
+
+def random_mirrors(n: int, bend: float) -> dict[str, np.ndarray]:
+    """Eyes, and triangles of many sizes and places, their corner normals bent by up to ``bend``."""
+    rng = np.random.default_rng(11)
+    size = 10.0 ** rng.uniform(-3, 0.5, (n, 1, 1))
+    corners = rng.normal(size=(n, 1, 3)) + size * rng.normal(size=(n, 3, 3))
+    facet = unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    normals = unit(facet[:, None] + bend * rng.uniform(0, 1, (n, 1, 1)) * rng.normal(size=(n, 3, 3)))
+    return {"eye": 4 * rng.normal(size=(n, 3)), "corners": corners, "normals": normals, "facet": facet}
+
+
+def reflected(mirrors: dict[str, np.ndarray], samples: int, flat: bool) -> tuple[np.ndarray, np.ndarray]:
+    """(n, samples, 3) origins and unit directions of rays from random points of each triangle."""
+    n = len(mirrors["eye"])
+    weights = np.random.default_rng(12).dirichlet((0.7, 0.7, 0.7), (n, samples))
+    point = weights @ mirrors["corners"]
+    normal = unit(np.repeat(mirrors["facet"][:, None], samples, axis=1) if flat else weights @ mirrors["normals"])
+    view = unit(point - mirrors["eye"][:, None])
+    return point, view - 2 * (view * normal).sum(axis=-1, keepdims=True) * normal
+
+
+def meet(origins: np.ndarray, directions: np.ndarray, centre: np.ndarray, radius: np.ndarray) -> np.ndarray:
+    """Whether rays meet spheres; the last axis of the vectors goes, the others broadcast."""
+    offset = centre - origins
+    along = (offset * directions).sum(axis=-1)
+    aside = (offset**2).sum(axis=-1) - along**2
+    return ((offset**2).sum(axis=-1) <= radius**2) | ((aside <= radius**2) & (along > 0))
+
+
+@pytest.mark.parametrize("bend", [0.0, 0.05, 0.5, 3.0])
+def test_no_ray_is_lost(bend: float) -> None:
+    """100,000 placements of a mirror triangle, its normals, an eye and an object: for 64 rays from the triangle."""
+    mirrors = random_mirrors(100_000 // SPHERES // 4, bend)
+    origins, directions = reflected(mirrors, int(RUN), flat=False)
+    rng = np.random.default_rng(13)
+    centre, radius = 3 * rng.normal(size=(SPHERES, 3)), 10.0 ** rng.uniform(-2, 0.3, SPHERES)
+    rays = RayBuffer()
+    rays.origin = wp.array(origins.reshape(-1, 3), dtype=wp.vec3d, device=launch.resolve_device(None))
+    rays.direction = on_device(directions.reshape(-1, 3))
+    device, n = rays.origin.device, rays.origin.shape[0]
+    rays.source = wp.full(n, SPHERES, dtype=wp.int32, device=device)
+    objects = []
+    for c, r in zip(centre, radius, strict=True):
+        record = ObjectRecord()
+        record.centre, record.radius = wp.vec3(*c), float(r) * (1 + 1e-5)  # as in a scene
+        objects.append(record)
+    records = wp.array(objects, dtype=ObjectRecord, device=device)
+    bits = wp.empty((len(origins), (SPHERES + 31) // 32), dtype=wp.uint32, device=device)
+    nothing, none_kept = wp.empty(0, dtype=wp.int32, device=device), wp.empty(0, dtype=wp.uint8, device=device)
+    launch.launch(cull_runs, len(origins), [rays, records, nothing, nothing, bits, none_kept], device)
+    kept = np.unpackbits(bits.numpy().view(np.uint8), axis=1, bitorder="little")[:, :SPHERES] != 0
+    truth = np.stack([meet(origins, directions, c, r).any(axis=1) for c, r in zip(centre, radius, strict=True)], 1)
+    assert 0.02 < truth.mean() < 0.98
+    assert not (truth & ~kept).any(), f"{(truth & ~kept).sum()} of {truth.sum()} lost"
+    assert kept.sum() <= 1.01 * truth.sum(), "a run keeps what none of its rays meets"
+
+
+def test_flat_is_exact_for_flat_mirrors() -> None:
+    """Drops nothing that reflects, but for float32's roots; keeps little else: what lies in the infinite cone."""
+    n = 30_000
+    mirrors = random_mirrors(n, 0.0)
+    rng = np.random.default_rng(14)
+    centre, radius = 3 * rng.normal(size=(n, 3)), 10.0 ** rng.uniform(-2, 0.3, n)
+    vectors = [on_device(mirrors["eye"]), on_device(mirrors["corners"]), on_device(centre)]
+    radii = wp.array(radius.astype(np.float32), dtype=float, device=vectors[0].device)
+    flat = wp.zeros(n, dtype=int, device=vectors[0].device)
+    launch.launch(answer_flat, n, [*vectors, radii, flat], vectors[0].device)
+    truth = np.zeros(n, bool)
+    for part in range(0, n, 5000):
+        span = slice(part, part + 5000)
+        rays = reflected({name: values[span] for name, values in mirrors.items()}, 200, flat=True)
+        truth[span] = meet(*rays, centre[span, None], (1 - 1e-4) * radius[span, None]).any(axis=1)  # not by rounding
+    shown = flat.numpy() != 0
+    assert 0.02 < truth.mean() < 0.98
+    assert (truth & ~shown).mean() < 1e-4
+    assert (shown & ~truth).mean() < 0.02
+
+
+def two_object_scene(**reflector: object) -> Scene:
+    return Scene(
+        camera=Camera(eye=(0, -4, 1), look_at=(0, 0, 0), width=160, height=120, fov_y=35),
+        objects=(
+            Object(shape="sphere", material=Material(mirror=(1, 1, 1)), **reflector),
+            Object(shape="torus_knot", params={"segments": [200, 30]}, scale=0.4, translate=(0.9, -1.2, 0)),
+        ),
+    )
+
+
+@pytest.mark.parametrize("segments", [[8, 4], [32, 16], [128, 64]])
+def test_culling_changes_no_pixel(segments: list[int]) -> None:
+    scene = two_object_scene(params={"segments": segments})
+    everything = ldtrefl.render(scene, "ldt", skip="none")
+    culled = ldtrefl.render(scene, "ldt")
+    np.testing.assert_array_equal(culled.image, everything.image)
+    counters = culled.stats.counters
+    assert counters["searches"] < counters["rays"] / 2 and everything.stats.counters["searches"] == counters["rays"]
+    assert counters["searches"] + counters["searches_saved"] == counters["rays"]
+    assert 0 < counters["triangles_culled"] < counters["triangles_tested"]
+
+
+def test_flat_loses_pixels_of_curved_mirrors() -> None:
+    """Why it is not the default: the normals turn within a triangle."""
+    scene = ldtrefl.load_scene(SCENES / "bowl_mirror.toml")
+    flat, safe = ldtrefl.render(scene, "ldt", cull="flat"), ldtrefl.render(scene, "ldt")
+    assert flat.hits is not None and safe.hits is not None
+    lost = (safe.hits.object >= 0) & (flat.hits.object < 0)
+    assert 0 < lost.sum() < 0.03 * (safe.hits.object >= 0).sum()
+    assert not ((flat.hits.object >= 0) & (safe.hits.object < 0)).any()
+
+
+@pytest.mark.parametrize("bounces", [1, 3])
+def test_objects_that_nothing_reflects_are_not_peeled(bounces: int) -> None:
+    scene = two_object_scene()
+    behind = Object(shape="gyroid", translate=(0, 1.5, -0.375), scale=0.1)  # in the ball's shadow as seen by the eye
+    with_more = Scene(camera=scene.camera, objects=(*scene.objects, behind))
+    frame = ldtrefl.render(with_more, "ldt", max_bounces=bounces)
+    assert frame.stats.counters["objects_peeled"] == 1
+    away = scene.with_camera(Camera(eye=(0, -4, 1), look_at=(0, -8, 1), width=32, height=32))
+    none = ldtrefl.render(away, "ldt")
+    assert none.stats.counters["rays"] == 0 and "objects_peeled" not in none.stats.counters
+
+
+def test_objects_are_met_nearest_first() -> None:
+    """Ten knots in a row before the ball: those behind the first are hardly searched, in whatever order they stand."""
+    ball = Object(shape="sphere", material=Material(mirror=(1, 1, 1)))
+    knots = [
+        Object(shape="box", params={}, scale=0.3, translate=(0.0, -2.0 - 0.7 * i, 0.3 + 0.02 * i)) for i in range(10)
+    ]
+    camera = Camera(eye=(0, -3, 3), look_at=(0, 0, 0), width=96, height=96, fov_y=45)
+    images = []
+    for order in (1, -1):
+        scene = Scene(camera=camera, objects=(ball, *knots[::order]))
+        frame = ldtrefl.render(scene, "ldt")
+        unbounded = ldtrefl.render(scene, "ldt", skip="reflection,regions,maps")
+        np.testing.assert_array_equal(frame.image, unbounded.image)
+        assert frame.stats.counters["searches"] < 0.5 * unbounded.stats.counters["searches"]
+        images.append(frame.image)
+    np.testing.assert_array_equal(images[0], images[1])

@@ -1,0 +1,115 @@
+"""Meshes of very different sizes in one: float64 decides what is right."""
+
+import dataclasses
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from stress_cases import outliers
+from stress_cases.judge import Outcome, brute_force
+
+import ldtrefl
+from ldtrefl.ldt.exact import build
+from ldtrefl.scene import shapes
+
+
+def test_an_outlier_changes_no_answer_and_a_wrong_one_is_found() -> None:
+    """The stress test's case with few rays, and its judge with a hit that is missing, moved, and too many."""
+    outcomes = outliers.run(400, 0)
+    assert len(outcomes) == 3 * (3 * 6 * 2 + 1)
+    assert all(o.passed for o in outcomes), [o for o in outcomes if not o.passed]
+    mesh = outliers.with_outlier("beside", 1e4)
+    origins, directions = outliers.rays_to_knot(400, 2.0, 1)
+    true_t, _ = brute_force(mesh, origins, directions)
+    hits = ldtrefl.Raycaster(mesh.vertices, mesh.faces).trace(origins, directions)
+    hit, miss = np.flatnonzero(np.isfinite(true_t))[0], np.flatnonzero(np.isinf(true_t))[0]
+    for ray, t, triangle in ((hit, np.inf, -1), (hit, 1.001 * true_t[hit], 0), (miss, 1.0, 0)):
+        changed = dataclasses.replace(hits, t=hits.t.copy(), triangle=hits.triangle.copy())
+        changed.t[ray], changed.triangle[ray] = t, triangle
+        assert not outliers.judge_outlier(Outcome(), mesh, changed, true_t, origins, directions).passed
+
+
+def test_an_ordinary_mesh_has_no_strays() -> None:
+    for name in shapes.names():
+        mesh = shapes.make(name)
+        assert len(mesh.strays) == 0 and mesh.bulk is mesh.bounds
+    assert outliers.with_outlier("dust", 1e3).strays.tolist() == [2 * 64 * 16]
+
+
+def test_doubted_hits_come_to_an_end() -> None:
+    """Past a patch's back a search goes on by the horizon; where that is less than t's rounding, it must end too."""
+    program = """
+import numpy as np, ldtrefl
+from ldtrefl.scene import shapes
+knot = shapes.make("torus_knot", {"segments": [2000, 125]})
+maps = ldtrefl.peel(knot.vertices, knot.faces)
+assert maps.tree.patches and maps.tree.view.front != 0.0
+maps.tree.view.horizon = 0.0
+rng = np.random.default_rng(0)
+inside = knot.vertices[rng.integers(0, len(knot.vertices), 50_000)] * 0.999
+hits = maps.trace(inside, rng.normal(size=inside.shape))
+print((hits.triangle >= 0).sum())
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 0, done.stderr
+    assert int(done.stdout) > 10_000
+
+
+def test_more_triangles_than_memory_allows_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    vertices = np.random.default_rng(0).uniform(-1, 1, (3000, 3))
+    monkeypatch.setattr(build, "MOST_RECORDS", 10)
+    with pytest.raises(ldtrefl.InputError, match="the mesh has 1000 triangles, too many to search"):
+        ldtrefl.peel(vertices, np.arange(3000).reshape(-1, 3))
+
+
+def test_more_triangles_than_an_int32_numbers_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("ldtrefl.world.device_scene.MOST_NUMBERS", 100)
+    camera = ldtrefl.Camera(eye=(0, -5, 0), look_at=(0, 0, 0), width=4, height=4)
+    boxes = tuple(ldtrefl.Object(shape="box") for _ in range(9))
+    ldtrefl.render(ldtrefl.Scene(camera=camera, objects=boxes[:4]))
+    with pytest.raises(ldtrefl.InputError, match="the objects have more than 100 vertices, instances counted in"):
+        ldtrefl.render(ldtrefl.Scene(camera=camera, objects=boxes))
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("size", [1e9, 1e20, 1e38, 1e90])
+def test_a_bulk_too_small_to_be_seen_is_no_trouble(size: float) -> None:
+    """A damaged coordinate makes the mesh's box so large that the rest of it is less than float32 has numbers for."""
+    mesh = outliers.with_outlier("beside", size)
+    camera = ldtrefl.Camera(eye=(0, -5, 1), look_at=(0, 0, 0), width=16, height=16)
+    ball = ldtrefl.Object(shape="sphere", params={"segments": [16, 8]}, material=ldtrefl.Material(mirror=0.9))
+    thing = ldtrefl.Object(mesh=mesh, fit=2.0, translate=(1.5, 0, 0))
+    lit = {
+        "lighting": ldtrefl.Lighting(shadows=True),
+        "lights": (ldtrefl.Light(kind="point", position=(0, -3, 3), intensity=4),),
+    }
+    scene = ldtrefl.Scene(camera=camera, objects=(ball, thing), **lit)
+    for method in ("ldt", "bvh"):
+        assert np.isfinite(ldtrefl.render(scene, method).image).all()
+
+
+def test_strays_are_found_wherever_they_stand_and_the_bulk_is_the_rest() -> None:
+    knot = shapes.make("torus_knot", {"segments": [200, 20]})
+    n, m = len(knot.vertices), len(knot.faces)
+    far = np.array([[0.0, 0.0, 300.0], [1.0, 0.0, 300.0], [0.0, 1.0, 300.0]])
+    for places in ([0], [m], [0, 1023, 1024, 4095, 4096, m + 5], list(range(64))):
+        faces = np.insert(knot.faces, np.array(places) - np.arange(len(places)), [n, n + 1, n + 2], axis=0)
+        mesh = ldtrefl.Mesh(np.vstack([knot.vertices, far]), faces)
+        assert mesh.strays.tolist() == places
+        assert np.array_equal(mesh.bulk, knot.bounds)
+        assert mesh.bounds[1, 2] == 300.0
+    faces = np.vstack([knot.faces, np.tile([n, n + 1, n + 2], (65, 1))])
+    mesh = ldtrefl.Mesh(np.vstack([knot.vertices, far]), faces)
+    assert len(mesh.strays) == 0 and mesh.bulk is mesh.bounds
+
+
+def test_of_triangles_that_all_reach_far_out_none_is_a_stray() -> None:
+    """The first corners lie together, the others do not: there is no bulk."""
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 100, 0], [0, 0, 100], [0, 100, 1], [1, 0, 100]], float)
+    faces = np.array([[0, 2, 3], [1, 4, 5]])
+    mesh = ldtrefl.Mesh(vertices, faces)
+    assert len(mesh.strays) == 0 and mesh.bulk is mesh.bounds
+    for maker in (ldtrefl.peel, ldtrefl.Raycaster):
+        hits = maker(vertices, faces).trace([[-5.0, 30.0, 30.0]], [[1.0, 0.0, 0.0]])
+        assert hits.triangle.tolist() == [0] and abs(hits.t[0] - 5.0) < 1e-4
