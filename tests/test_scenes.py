@@ -9,8 +9,7 @@ import pytest
 
 import ldtrefl
 from ldtrefl.compare import metrics
-
-from .conftest import SCENES
+from tests.conftest import SCENES
 
 SHIPPED = sorted(SCENES.glob("*.toml"))
 LINEAR_SSIM = 0.985

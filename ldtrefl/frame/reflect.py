@@ -34,7 +34,7 @@ from ldtrefl.shading.shade import (
 )
 from ldtrefl.tracing.hit import Hit, no_hit
 from ldtrefl.tracing.rays import HitBuffer, RayBuffer, Regions, lowest_bit, object_bits
-from ldtrefl.tracing.trace import Query, Tracer, block_of, occluded_of, stray_merger
+from ldtrefl.tracing.trace import Query, Tracer, block_of, occluded_of, outlier_merger
 from ldtrefl.world.camera import camera_ray
 from ldtrefl.world.device_scene import LightingRecord, ObjectRecord
 from ldtrefl.world.unit_rays import into_unit, start_above, start_above_own, unit_normal
@@ -73,18 +73,18 @@ def never_occluded(views: wp.array(dtype=NoView), index: int, query: Query, outw
 
 
 @wp.func
-def never_stray(views: wp.array(dtype=NoView), index: int, origin: wp.vec3d, direction: wp.vec3, t_max: float) -> Hit:
-    """``stray_hit`` of a tracer that sees nothing."""
+def never_outlier(views: wp.array(dtype=NoView), index: int, origin: wp.vec3d, direction: wp.vec3, t_max: float) -> Hit:
+    """``outlier_hit`` of a tracer that sees nothing."""
     return no_hit()
 
 
 @wp.func
-def nothing_strays(views: wp.array(dtype=NoView), index: int) -> int:
-    """``stray_count`` of a tracer that sees nothing."""
+def no_outliers(views: wp.array(dtype=NoView), index: int) -> int:
+    """``outlier_count`` of a tracer that sees nothing."""
     return 0
 
 
-NOTHING = Tracer("nothing", NoView, never_hits, never_hits, never_occluded, never_stray, nothing_strays)
+NOTHING = Tracer("nothing", NoView, never_hits, never_hits, never_occluded, never_outlier, no_outliers)
 """The tracer of scenes without shadows: kernels built from it hold no shadow rays."""
 
 
@@ -164,7 +164,7 @@ def keep_nearer(hits: HitBuffer, i: int, k: int, t: float, hit: Hit):
 def closest_hits_kernel(tracer: Tracer, block: int, bounds: bool = True) -> wp.Kernel:
     """The kernel that finds where rays end, ``block`` of them an item. With ``bounds`` an object is searched only for
     the rays that enter its bounding sphere before they have met another; of 32 the first to be entered comes first."""
-    find_hits, merge_strays = tracer.closest_hits, stray_merger(tracer)
+    find_hits, merge_outliers = tracer.closest_hits, outlier_merger(tracer)
     size, to_infinity = wp.constant(block), wp.constant(not bounds)
 
     @launch.kernel
@@ -226,7 +226,7 @@ def closest_hits_kernel(tracer: Tracer, block: int, bounds: bool = True) -> wp.K
                             count += 1
                 if count > 0:
                     find_hits(views, k, queries, count, found)
-                    merge_strays(views, k, queries, count, found)
+                    merge_outliers(views, k, queries, count, found)
                 for j in range(count):
                     of = int(number[j])
                     hits.steps[of] = hits.steps[of] + found[j].steps

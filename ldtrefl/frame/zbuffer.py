@@ -84,7 +84,7 @@ def project_vertices(
     index = chunks.object[chunk]
     vertices = objects[index].vertices
     first_vertex = objects[index].first_vertex
-    has_strays = objects[index].exact_vertices.shape[0] > 0
+    has_outliers = objects[index].exact_vertices.shape[0] > 0
     place = 3 * chunks.place[chunk]
     row_x, row_y, row_z = rows[place], rows[place + 1], rows[place + 2]
     i = int(chunks.begin[chunk])
@@ -93,7 +93,7 @@ def project_vertices(
         p = wp.vec4d(
             wp.float64(vertices[i][0]), wp.float64(vertices[i][1]), wp.float64(vertices[i][2]), wp.float64(1.0)
         )
-        if has_strays:
+        if has_outliers:
             exact = objects[index].exact_vertices[i]
             p = wp.vec4d(exact[0], exact[1], exact[2], wp.float64(1.0))
         x, y, depth = wp.dot(row_x, p), wp.dot(row_y, p), wp.dot(row_z, p)

@@ -1,8 +1,8 @@
-"""Where nearly all of a mesh is, when a few triangles lie far outside: a stray vertex, dust, a ground without end.
+"""Where nearly all of a mesh is, when a few triangles lie far outside: a lone vertex, dust, a ground without end.
 
 Float32 resolves a ten-millionth of the unit cube. A mesh whose few outermost triangles make its box a thousand times
 larger would be resolved to a thousandth of what people look at, so the unit cube is put about the bulk alone. What lies
-outside is few enough to be tested in float64 (``strays.py``).
+outside is few enough to be tested in float64 (``outliers.py``).
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ TAIL = 0.05
 """Share of the samples left out at either end along each axis."""
 
 FAR_LARGER = 32.0
-"""Times that the whole box must be longer than the samples' for strays to be told apart: float32 then still resolves
+"""Times that the whole box must be longer than the samples' for outliers to be told apart: float32 then still resolves
 four millionths of the bulk without."""
 
 FARTHEST = 1e12
@@ -30,7 +30,7 @@ FARTHEST = 1e12
 REACH = 2.0
 """Of the samples' longest side, how far from their middle the bulk may go on along each axis."""
 
-MOST_STRAYS = 64
+MOST_OUTLIERS = 64
 """Triangles outside the bulk up to which they are tested one by one. With more the mesh has no bulk."""
 
 NOWHERE = wp.constant(wp.float64(np.inf))
@@ -68,7 +68,7 @@ def measure_inside(
     high_out[chunk] = high
 
 
-def split_strays(vertices: np.ndarray, faces: np.ndarray, bounds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def split_outliers(vertices: np.ndarray, faces: np.ndarray, bounds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The few triangles that lie far outside where nearly all others are, and the box about the others.
 
     Args:
@@ -88,7 +88,7 @@ def split_strays(vertices: np.ndarray, faces: np.ndarray, bounds: np.ndarray) ->
         return none
     middle, reach = low + (high - low) / 2.0, REACH * side
     outside, box = _inside(vertices, faces, middle, reach)
-    if not 0 < outside.sum() <= min(MOST_STRAYS, len(faces) - 1):
+    if not 0 < outside.sum() <= min(MOST_OUTLIERS, len(faces) - 1):
         return none
     begin = int(CHUNK) * np.flatnonzero(outside)
     near = (begin[:, None] + np.arange(int(CHUNK))).reshape(-1)

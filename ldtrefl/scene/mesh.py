@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ldtrefl.base.errors import InputError
-from ldtrefl.scene.bulk import split_strays
+from ldtrefl.scene.bulk import split_outliers
 from ldtrefl.scene.mesh_passes import copied_faces, copied_vertices, fitted_vertices, is_constant
 from ldtrefl.scene.normals import vertex_normals
 
@@ -88,16 +88,16 @@ class Mesh:
 
     @functools.cached_property
     def _split(self) -> tuple[np.ndarray, np.ndarray]:
-        return split_strays(self.vertices, self.faces, self.bounds)
+        return split_outliers(self.vertices, self.faces, self.bounds)
 
     @property
-    def strays(self) -> np.ndarray:
+    def outliers(self) -> np.ndarray:
         """(k,) int32: the few triangles far outside the bulk, most often none."""
         return self._split[0]
 
     @property
     def bulk(self) -> np.ndarray:
-        """(2, 3) float64: the lowest and highest corner of the box about all triangles but the strays."""
+        """(2, 3) float64: the lowest and highest corner of the box about all triangles but the outliers."""
         return self._split[1]
 
     @functools.cached_property

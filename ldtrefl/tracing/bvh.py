@@ -14,7 +14,7 @@ from ldtrefl.device import launch
 from ldtrefl.geometry.vectors import as_single, point_along
 from ldtrefl.scene.mesh import Mesh
 from ldtrefl.tracing.hit import Hit, no_hit
-from ldtrefl.tracing.stray_hits import first_stray
+from ldtrefl.tracing.outlier_hits import first_outlier_hit
 from ldtrefl.tracing.trace import (
     Hits,
     Query,
@@ -26,7 +26,7 @@ from ldtrefl.tracing.trace import (
     trace_batch,
 )
 from ldtrefl.world.device_scene import DeviceMesh
-from ldtrefl.world.strays import Strays
+from ldtrefl.world.outliers import Outliers
 from ldtrefl.world.unit_rays import SPHERE, distance_passed
 
 
@@ -34,8 +34,8 @@ from ldtrefl.world.unit_rays import SPHERE, distance_passed
 class BvhView:
     """A mesh with its BVH."""
 
-    mesh: wp.uint64  # without the strays
-    strays: Strays
+    mesh: wp.uint64  # without the outliers
+    outliers: Outliers
 
 
 @wp.func
@@ -67,17 +67,17 @@ def occluded_bvh(views: wp.array(dtype=BvhView), index: int, query: Query, outwa
 
 
 @wp.func
-def stray_hit_bvh(
+def outlier_hit_bvh(
     views: wp.array(dtype=BvhView), index: int, origin: wp.vec3d, direction: wp.vec3, t_max: float
 ) -> Hit:
-    """The tracer's ``stray_hit``."""
-    return first_stray(views[index].strays, origin, direction, t_max)
+    """The tracer's ``outlier_hit``."""
+    return first_outlier_hit(views[index].outliers, origin, direction, t_max)
 
 
 @wp.func
-def stray_count_bvh(views: wp.array(dtype=BvhView), index: int) -> int:
-    """The tracer's ``stray_count``."""
-    return views[index].strays.triangles.shape[0]
+def outlier_count_bvh(views: wp.array(dtype=BvhView), index: int) -> int:
+    """The tracer's ``outlier_count``."""
+    return views[index].outliers.triangles.shape[0]
 
 
 BVH = Tracer(
@@ -86,8 +86,8 @@ BVH = Tracer(
     one_by_one(closest_hit_bvh, BvhView),
     any_one_by_one(occluded_bvh, BvhView),
     occluded_bvh,
-    stray_hit_bvh,
-    stray_count_bvh,
+    outlier_hit_bvh,
+    outlier_count_bvh,
 )
 
 
@@ -117,17 +117,17 @@ class Raycaster:
     def _build(self, geometry: DeviceMesh) -> None:
         self.geometry = geometry
         faces = geometry.faces
-        if len(geometry.mesh.strays):
+        if len(geometry.mesh.outliers):
             # A point is never met; the others keep their numbers.
             rest = geometry.mesh.faces.copy()
-            rest[geometry.mesh.strays] = rest[np.delete(np.arange(len(rest)), geometry.mesh.strays)[0], :1]
+            rest[geometry.mesh.outliers] = rest[np.delete(np.arange(len(rest)), geometry.mesh.outliers)[0], :1]
             faces = wp.array(rest, dtype=wp.vec3i, device=faces.device)
         self._mesh = wp.Mesh(geometry.vertices, faces.view(wp.int32).flatten())
 
     def view(self) -> Any:
         """The ``BvhView`` for kernels."""
         view = BvhView()
-        view.mesh, view.strays = self._mesh.id, self.geometry.strays
+        view.mesh, view.outliers = self._mesh.id, self.geometry.outliers
         return view
 
     def trace(self, origins: Any, directions: Any, t_max: Any = None) -> Hits:

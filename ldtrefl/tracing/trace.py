@@ -44,8 +44,8 @@ class Tracer:
     ``occluded(views, index, query, outwards) -> bool``: whether one ray does. ``outwards`` is 0 but for a ray that
     leaves the object's own surface: it is the unit normal there, on the ray's side, and what the tracer takes for that
     surface is not met.
-    ``stray_hit(views, index, origin, direction, t_max) -> Hit``: for what lies far outside the object's bulk; the
-    origin is float64 and may lie anywhere. ``stray_count(views, index) -> int``: how much does.
+    ``outlier_hit(views, index, origin, direction, t_max) -> Hit``: for what lies far outside the object's bulk; the
+    origin is float64 and may lie anywhere. ``outlier_count(views, index) -> int``: how much does.
     """
 
     name: str
@@ -53,8 +53,8 @@ class Tracer:
     closest_hits: Any
     any_hits: Any
     occluded: Any
-    stray_hit: Any
-    stray_count: Any
+    outlier_hit: Any
+    outlier_count: Any
 
 
 def one_by_one(closest_hit: Any, view: Any) -> Any:
@@ -105,34 +105,34 @@ def array_of_views(views: Sequence[Any], view: Any, device: wp.Device) -> wp.arr
 
 
 @launch.once
-def stray_merger(tracer: Tracer) -> Any:
+def outlier_merger(tracer: Tracer) -> Any:
     """``merge(views, index, queries, count, hits)``: what rays meet far outside the bulk counts, too."""
-    stray_hit, stray_count = tracer.stray_hit, tracer.stray_count
+    outlier_hit, outlier_count = tracer.outlier_hit, tracer.outlier_count
 
     @wp.func
     def merge(views: Any, index: int, queries: wp.array(dtype=Query), count: int, hits: wp.array(dtype=Hit)):
-        if stray_count(views, index) > 0:
+        if outlier_count(views, index) > 0:
             for i in range(count):
                 t_max = queries[i].t_max
                 if hits[i].triangle >= 0:
                     t_max = hits[i].t
-                stray = stray_hit(views, index, queries[i].origin, queries[i].direction, t_max)
-                if stray.triangle >= 0:
-                    stray.steps = hits[i].steps
-                    hits[i] = stray
+                outlier = outlier_hit(views, index, queries[i].origin, queries[i].direction, t_max)
+                if outlier.triangle >= 0:
+                    outlier.steps = hits[i].steps
+                    hits[i] = outlier
 
     return merge
 
 
 @launch.once
 def occluded_of(tracer: Tracer) -> Any:
-    """``is_blocked(views, index, query, outwards) -> bool``: the tracer's ``occluded``, strays counted."""
-    occluded, stray_hit, stray_count = tracer.occluded, tracer.stray_hit, tracer.stray_count
+    """``is_blocked(views, index, query, outwards) -> bool``: the tracer's ``occluded``, outliers counted."""
+    occluded, outlier_hit, outlier_count = tracer.occluded, tracer.outlier_hit, tracer.outlier_count
 
     @wp.func
     def is_blocked(views: Any, index: int, query: Query, outwards: wp.vec3) -> bool:
-        if stray_count(views, index) > 0:
-            if stray_hit(views, index, query.origin, query.direction, query.t_max).triangle >= 0:
+        if outlier_count(views, index) > 0:
+            if outlier_hit(views, index, query.origin, query.direction, query.t_max).triangle >= 0:
                 return True
         return occluded(views, index, query, outwards)
 
@@ -216,7 +216,7 @@ def batch_kernel(tracer: Tracer, block: int, only_whether: bool = False) -> wp.K
     """The kernel that traces rays given in object space, ``block`` of them an item; or that finds ``only_whether`` they
     meet anything, by the number of the triangle, which may be any then."""
     find_hits = tracer.any_hits if only_whether else tracer.closest_hits
-    merge_strays, size = stray_merger(tracer), wp.constant(block)
+    merge_outliers, size = outlier_merger(tracer), wp.constant(block)
 
     @launch.kernel
     def trace_batch(
@@ -246,7 +246,7 @@ def batch_kernel(tracer: Tracer, block: int, only_whether: bool = False) -> wp.K
         scales = wp.array(ptr=scale_room.ptr, shape=(size,), dtype=wp.float32)
         invalid = start_queries(origins, directions, t_max, begin, count, centre, per_half, queries, scales)
         find_hits(views, 0, queries, count, hits)
-        merge_strays(views, 0, queries, count, hits)
+        merge_outliers(views, 0, queries, count, hits)
         if t_out.shape[0] > 0:
             write_hits(hits, scales, per_half, begin, count, t_out, normal_out, triangle_out, barycentrics_out)
         else:

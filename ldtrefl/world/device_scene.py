@@ -22,7 +22,7 @@ from ldtrefl.files.pictures import decoded_bytes
 from ldtrefl.scene.description import Camera, Light, Object, Scene
 from ldtrefl.scene.mesh import Mesh
 from ldtrefl.world.camera import unit_up
-from ldtrefl.world.strays import strays_of
+from ldtrefl.world.outliers import outliers_of
 
 MOST_NUMBERS = (1 << 31) - 1
 """Triangles and vertices of all objects together: they are numbered by int32."""
@@ -143,15 +143,15 @@ class DeviceMesh:
         """By ``id`` of the texture, which is kept beside."""
 
     @functools.cached_property
-    def strays(self) -> Any:
-        """The mesh's ``Strays``."""
-        return strays_of(self.mesh, self.vertices.device)
+    def outliers(self) -> Any:
+        """The mesh's ``Outliers``."""
+        return outliers_of(self.mesh, self.vertices.device)
 
     @functools.cached_property
     def exact_vertices(self) -> wp.array:
-        """(n,) vec3d in unit space if the mesh has strays, else empty: float32 then holds for all of it."""
+        """(n,) vec3d in unit space if the mesh has outliers, else empty: float32 then holds for all of it."""
         centre, half = self.mesh.unit_frame
-        exact = (self.mesh.vertices - centre) / half if len(self.mesh.strays) else np.zeros((0, 3))
+        exact = (self.mesh.vertices - centre) / half if len(self.mesh.outliers) else np.zeros((0, 3))
         return wp.array(exact, dtype=wp.vec3d, device=self.vertices.device, copy=False)
 
     @functools.cached_property

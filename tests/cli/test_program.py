@@ -10,8 +10,7 @@ from pathlib import Path
 import pytest
 
 from ldtrefl.base.errors import InputError, printable
-
-from .conftest import SMALL_SCENE
+from tests.conftest import SMALL_SCENE
 
 NAME = "chair [/old] [red] :smile: \\u001b[31m\\n"
 PROGRAM = f"{sys.executable} -m ldtrefl"

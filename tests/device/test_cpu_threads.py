@@ -18,8 +18,7 @@ import warp as wp
 import ldtrefl
 from ldtrefl.cli.commands import main
 from ldtrefl.device import cpu_threads, kernel_cache, launch, python_pool, warp_abi
-
-from .conftest import SMALL_SCENE
+from tests.conftest import SMALL_SCENE
 
 
 @launch.kernel

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from .conftest import SMALL_SCENE
+from tests.conftest import SMALL_SCENE
 
 TRACE = """
 import numpy as np

@@ -26,8 +26,7 @@ from ldtrefl.ldt.texel_frame import texel_frame
 from ldtrefl.ldt.texture import peel_mesh
 from ldtrefl.scene import shapes
 from ldtrefl.world.device_scene import DeviceMesh
-
-from .conftest import SMALL_SCENE
+from tests.conftest import SMALL_SCENE
 
 KNOT = {"segments": [300, 40]}
 SCENE = SMALL_SCENE.replace("segments = [16, 8] }\ntranslate", "segments = [150, 50] }\ntranslate")

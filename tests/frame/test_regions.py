@@ -10,8 +10,7 @@ from ldtrefl.frame.regions import cull_runs, shows_flat
 from ldtrefl.scene.description import Camera, Material, Object, Scene
 from ldtrefl.tracing.rays import RUN, RayBuffer
 from ldtrefl.world.device_scene import ObjectRecord
-
-from .conftest import SCENES
+from tests.conftest import SCENES
 
 SPHERES = 50
 """Objects that every run of rays is tested against."""

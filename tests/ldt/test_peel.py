@@ -9,8 +9,7 @@ import pytest
 
 import ldtrefl
 from ldtrefl.scene import shapes
-
-from .conftest import CLOSED_MESHES
+from tests.conftest import CLOSED_MESHES
 
 CLOSED_SHAPES = ("box", "bowl", "genus3", "gyroid", "hollow_box", "room", "sphere", "torus", "torus_knot", "wires")
 

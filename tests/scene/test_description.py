@@ -9,8 +9,7 @@ import pytest
 
 import ldtrefl
 from ldtrefl.scene.description import Camera, Object, Scene
-
-from .conftest import SMALL_SCENE
+from tests.conftest import SMALL_SCENE
 
 THING = 'shape = "torus"\nparams = { segments = [16, 8] }'
 WRONG = [

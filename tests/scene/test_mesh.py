@@ -10,8 +10,7 @@ from PIL import Image
 
 import ldtrefl
 from ldtrefl.scene.description import Camera, Environment, Lighting, Material, Object, Scene
-
-from .conftest import REAL_MESHES
+from tests.conftest import REAL_MESHES
 
 
 @pytest.mark.parametrize("name", REAL_MESHES)

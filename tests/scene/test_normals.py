@@ -10,8 +10,7 @@ import ldtrefl
 from ldtrefl.scene import shapes
 from ldtrefl.scene.normals import split_by_side, vertex_normals
 from ldtrefl.scene.welding import first_of_equals
-
-from .conftest import REAL_MESHES
+from tests.conftest import REAL_MESHES
 
 SCANS_WITH_FOLDS = {"happy_buddha.ply": 600}
 """Meshes in which some triangles lie on their mirror images: how many corners may differ from a plain mean."""

@@ -18,8 +18,7 @@ from ldtrefl.base import budget
 from ldtrefl.base.sharing import shared_while_used
 from ldtrefl.scene import shapes
 from ldtrefl.scene.toml_text import MAX_BRACKETS, MAX_BYTES, MAX_DOTS, MAX_WORD, parse_toml, read_toml
-
-from .conftest import SMALL_SCENE
+from tests.conftest import SMALL_SCENE
 
 
 @pytest.fixture(autouse=True)

@@ -11,8 +11,7 @@ from stress_cases.judge import rays_about
 
 import ldtrefl
 from ldtrefl.scene import shapes
-
-from .conftest import REAL_MESHES
+from tests.conftest import REAL_MESHES
 
 SHAPES = tuple(name for name in shapes.names())
 

@@ -15,7 +15,7 @@ METHODS = [("bvh", {}), ("ldt", {}), ("ldt", {"quality": "exact"})]
 DARK = Material(albedo=(0, 0, 0), mirror=(0.8,) * 3)
 
 
-def strays(distance: float) -> tuple[Object, ...]:
+def outliers(distance: float) -> tuple[Object, ...]:
     """A box far away that makes the scene so much larger."""
     return (Object(shape="box", scale=0.3, translate=(-distance, 0.7 * distance, -0.3 * distance)),)
 
@@ -57,7 +57,7 @@ def test_a_small_object_in_a_large_scene_looks_as_alone(method: str, options: di
         )
         return ldtrefl.render(scene, method, **options).image
 
-    differences = np.abs(picture(*strays(distance)) - picture()).max(axis=2)
+    differences = np.abs(picture(*outliers(distance)) - picture()).max(axis=2)
     assert (differences > 1e-4).sum() == 0, f"{(differences > 1e-4).sum()} pixels, up to {differences.max():.3g}"
 
 

@@ -27,8 +27,8 @@ def run(rays: int, pictures: int) -> list[Outcome]:
     """Pictures of ``pictures`` pixels a side."""
     scenes = {f"size {size:g}": (box_on_floor(size, pictures), size) for size in (1e-6, 1e-4, 1.0, 1e4, 1e6)}
     for distance in (1e2, 1e4, 1e6, 1e8):
-        stray = Object(shape="box", scale=0.3, translate=(-distance, 0.7 * distance, -0.3 * distance))
-        scenes[f"a box {distance:g} sizes away"] = box_on_floor(1.0, pictures, stray), 1.0
+        outlier = Object(shape="box", scale=0.3, translate=(-distance, 0.7 * distance, -0.3 * distance))
+        scenes[f"a box {distance:g} sizes away"] = box_on_floor(1.0, pictures, outlier), 1.0
     for floor in (1e2, 1e4, 1e6):
         scenes[f"a floor of {floor:g} sizes"] = box_on_floor(1.0, pictures, floor=floor), 1.0
     outcomes = []

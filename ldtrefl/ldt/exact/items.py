@@ -23,7 +23,7 @@ def tree_of(geometry: DeviceMesh, resolution: int, quality: Quality, *, trusted:
         return _of_mixed(geometry, mixed)
     items = _items(geometry)
     items.numbers = _listed_bulk(geometry)
-    return build_tree(items, len(geometry.faces) - len(geometry.mesh.strays), _bulk_box(geometry), geometry)
+    return build_tree(items, len(geometry.faces) - len(geometry.mesh.outliers), _bulk_box(geometry), geometry)
 
 
 def _items(geometry: DeviceMesh) -> Any:
@@ -38,9 +38,11 @@ def _bulk_box(geometry: DeviceMesh) -> np.ndarray:
 
 
 def _listed_bulk(geometry: DeviceMesh) -> wp.array:
-    """The triangles that are no strays; an empty list if there are none."""
-    strays = geometry.mesh.strays
-    bulk = np.delete(np.arange(len(geometry.faces), dtype=np.int32), strays) if len(strays) else np.zeros(0, np.int32)
+    """The triangles that are no outliers; an empty list if there are none."""
+    outliers = geometry.mesh.outliers
+    bulk = (
+        np.delete(np.arange(len(geometry.faces), dtype=np.int32), outliers) if len(outliers) else np.zeros(0, np.int32)
+    )
     return wp.array(bulk, dtype=wp.int32, device=geometry.vertices.device)
 
 

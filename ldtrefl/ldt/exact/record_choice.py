@@ -129,7 +129,7 @@ def choose_records(
     """
     triangles = len(geometry.faces)
     few = FEWEST_TRIANGLES if trusted else FEW_TRIANGLES
-    if quality == "exact" or len(geometry.mesh.strays) > 0 or triangles <= few:
+    if quality == "exact" or len(geometry.mesh.outliers) > 0 or triangles <= few:
         return None
     side = PATCH_TEXELS[quality]
     sample = Sample(geometry.mesh, side / resolution)

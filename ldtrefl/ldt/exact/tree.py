@@ -22,7 +22,7 @@ import warp as wp
 
 from ldtrefl.device import warp_abi
 from ldtrefl.world.device_scene import DeviceMesh
-from ldtrefl.world.strays import Strays
+from ldtrefl.world.outliers import Outliers
 
 LANES = wp.constant(8)
 """Records in a block, and children of a node: the width of AVX2."""
@@ -61,7 +61,7 @@ class TreeView:
     in_turn: int  # 1: larger than a cache, so that rays that do not stay together are searched for in turn
     vertices: wp.array(dtype=wp.vec3)
     faces: wp.array(dtype=wp.vec3i)
-    strays: Strays  # what lies far outside, and not in the tree
+    outliers: Outliers  # what lies far outside, and not in the tree
 
 
 _ARRAYS = ("nodes", "rows")
@@ -114,7 +114,7 @@ class Tree:
     @classmethod
     def of(cls, view: Any, records: int, geometry: DeviceMesh) -> Tree:
         """The tree of a view that lacks its mesh."""
-        view.vertices, view.faces, view.strays = geometry.vertices, geometry.faces, geometry.strays
+        view.vertices, view.faces, view.outliers = geometry.vertices, geometry.faces, geometry.outliers
         made = cls(view, records)
         view.in_turn = int(made.nbytes > CACHED_BYTES)
         return made

@@ -15,7 +15,7 @@ from ldtrefl.geometry.triangle import barycentrics_at
 from ldtrefl.geometry.vectors import as_single, point_along
 from ldtrefl.ldt.exact.tree import NODE, STACK, TreeView
 from ldtrefl.tracing.hit import Hit
-from ldtrefl.tracing.stray_hits import first_stray
+from ldtrefl.tracing.outlier_hits import first_outlier_hit
 from ldtrefl.tracing.trace import RAY_BLOCK, Query, Tracer
 from ldtrefl.world.unit_rays import NEAR
 
@@ -230,19 +230,19 @@ def occluded_exact(views: wp.array(dtype=TreeView), index: int, query: Query, ou
 
 
 @wp.func
-def stray_hit_exact(
+def outlier_hit_exact(
     views: wp.array(dtype=TreeView), index: int, origin: wp.vec3d, direction: wp.vec3, t_max: float
 ) -> Hit:
-    """The tracer's ``stray_hit``."""
-    return first_stray(views[index].strays, origin, direction, t_max)
+    """The tracer's ``outlier_hit``."""
+    return first_outlier_hit(views[index].outliers, origin, direction, t_max)
 
 
 @wp.func
-def stray_count_exact(views: wp.array(dtype=TreeView), index: int) -> int:
-    """The tracer's ``stray_count``."""
-    return views[index].strays.triangles.shape[0]
+def outlier_count_exact(views: wp.array(dtype=TreeView), index: int) -> int:
+    """The tracer's ``outlier_count``."""
+    return views[index].outliers.triangles.shape[0]
 
 
 EXACT = Tracer(
-    "exact", TreeView, closest_hits_exact, any_hits_exact, occluded_exact, stray_hit_exact, stray_count_exact
+    "exact", TreeView, closest_hits_exact, any_hits_exact, occluded_exact, outlier_hit_exact, outlier_count_exact
 )

@@ -217,16 +217,16 @@ def occluded_linear(views: wp.array(dtype=LdtView), index: int, query: Query, ou
 
 
 @wp.func
-def no_stray_linear(
+def no_outlier_linear(
     views: wp.array(dtype=LdtView), index: int, origin: wp.vec3d, direction: wp.vec3, t_max: float
 ) -> Hit:
-    """The tracer's ``stray_hit``: the maps hold all triangles."""
+    """The tracer's ``outlier_hit``: the maps hold all triangles."""
     return no_hit()
 
 
 @wp.func
-def stray_count_linear(views: wp.array(dtype=LdtView), index: int) -> int:
-    """The tracer's ``stray_count``."""
+def outlier_count_linear(views: wp.array(dtype=LdtView), index: int) -> int:
+    """The tracer's ``outlier_count``."""
     return 0
 
 
@@ -236,6 +236,6 @@ LINEAR = Tracer(
     one_by_one(closest_hit_linear, LdtView),
     any_one_by_one(occluded_linear, LdtView),
     occluded_linear,
-    no_stray_linear,
-    stray_count_linear,
+    no_outlier_linear,
+    outlier_count_linear,
 )

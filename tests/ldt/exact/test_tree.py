@@ -13,8 +13,7 @@ from ldtrefl.device import launch
 from ldtrefl.ldt.texel_frame import point_from_texel
 from ldtrefl.ldt.texture import LayeredDepthTexture
 from ldtrefl.scene import shapes
-
-from .conftest import REAL_MESHES
+from tests.conftest import REAL_MESHES
 
 DENSE_KNOT = {"segments": [2000, 125]}
 

@@ -13,7 +13,7 @@ from ldtrefl.ldt.linear.march import march_linear
 from ldtrefl.ldt.texture import LayeredDepthTexture
 from ldtrefl.tracing.trace import array_of_views
 
-from .linear_reference import LinearReference
+from .reference import LinearReference
 
 
 @launch.kernel

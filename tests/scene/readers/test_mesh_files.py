@@ -16,8 +16,7 @@ from PIL import Image
 import ldtrefl
 from ldtrefl import InputError
 from ldtrefl.base import budget
-
-from .mesh_writers import write_glb, write_ply
+from tests.mesh_writers import write_glb, write_ply
 
 
 @pytest.fixture(autouse=True)

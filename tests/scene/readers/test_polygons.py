@@ -7,8 +7,7 @@ import pytest
 
 import ldtrefl
 from ldtrefl.scene.readers.polygons import triangles_of
-
-from .mesh_writers import write_ply
+from tests.mesh_writers import write_ply
 
 NOTCHED = [[0, 0, 0], [2, 0, 0], [2, 2, 0], [1, 0.5, 0], [0, 2, 0]]
 """A square of 2 less a triangle of 1.5 cut from above: area 2.5."""

@@ -1,4 +1,4 @@
-"""Rays against the few triangles far outside a mesh's bulk (``world/strays.py``), in float64."""
+"""Rays against the few triangles far outside a mesh's bulk (``world/outliers.py``), in float64."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import warp as wp
 from ldtrefl.device.native_sources import native_body
 from ldtrefl.geometry.vectors import as_double, as_single
 from ldtrefl.tracing.hit import Hit, no_hit
-from ldtrefl.world.strays import BOX_MARGIN, Strays, StrayTriangle
+from ldtrefl.world.outliers import BOX_MARGIN, Outliers, OutlierTriangle
 
 NEGLIGIBLE = 1.0e-30
 """Component of a direction below which the ray runs along the planes."""
@@ -42,23 +42,23 @@ def boxes_entered(
 
 
 @wp.func
-def stray_hit(stray: StrayTriangle, origin: wp.vec3d, direction: wp.vec3, t_max: float) -> Hit:
+def outlier_hit(outlier: OutlierTriangle, origin: wp.vec3d, direction: wp.vec3, t_max: float) -> Hit:
     """Test a triangle (Moeller and Trumbore 1997)."""
     hit = no_hit()
     zero, one = wp.float64(0.0), wp.float64(1.0)
     way = as_double(direction)
-    edge_u, edge_v = stray.edge_u, stray.edge_v
+    edge_u, edge_v = outlier.edge_u, outlier.edge_v
     p = wp.cross(way, edge_v)
     determinant = wp.dot(edge_u, p)
     if determinant != zero:
-        s = origin - stray.a
+        s = origin - outlier.a
         u = wp.dot(s, p) / determinant
         q = wp.cross(s, edge_u)
         v = wp.dot(way, q) / determinant
         t = wp.dot(edge_v, q) / determinant
         if u >= zero and v >= zero and u + v <= one and t >= zero and t < wp.float64(t_max):
             hit.t = float(t)
-            hit.triangle = stray.triangle
+            hit.triangle = outlier.triangle
             hit.u = float(u)
             hit.v = float(v)
             hit.normal = as_single(wp.normalize(wp.cross(edge_u, edge_v)))
@@ -66,18 +66,18 @@ def stray_hit(stray: StrayTriangle, origin: wp.vec3d, direction: wp.vec3, t_max:
 
 
 @wp.func
-def first_stray(strays: Strays, origin: wp.vec3d, direction: wp.vec3, t_max: float) -> Hit:
+def first_outlier_hit(outliers: Outliers, origin: wp.vec3d, direction: wp.vec3, t_max: float) -> Hit:
     """What a ray meets first of them, from ``origin`` in unit space."""
     hit = no_hit()
-    for group in range((strays.triangles.shape[0] + 7) / 8):
-        entered = boxes_entered(strays.boxes, group, origin, direction, t_max)
+    for group in range((outliers.triangles.shape[0] + 7) / 8):
+        entered = boxes_entered(outliers.boxes, group, origin, direction, t_max)
         if entered != 0:
             for k in range(8):
-                if (entered >> k) & 1 == 1 and 8 * group + k < strays.triangles.shape[0]:
+                if (entered >> k) & 1 == 1 and 8 * group + k < outliers.triangles.shape[0]:
                     nearest = t_max
                     if hit.triangle >= 0:
                         nearest = hit.t
-                    one = stray_hit(strays.triangles[8 * group + k], origin, direction, nearest)
+                    one = outlier_hit(outliers.triangles[8 * group + k], origin, direction, nearest)
                     if one.triangle >= 0:
                         hit = one
     return hit

@@ -16,7 +16,7 @@ from ldtrefl.scene.mesh import Mesh
 
 
 @wp.struct
-class StrayTriangle:
+class OutlierTriangle:
     """A triangle in unit space."""
 
     a: wp.vec3d
@@ -26,10 +26,10 @@ class StrayTriangle:
 
 
 @wp.struct
-class Strays:
+class Outliers:
     """All of a mesh."""
 
-    triangles: wp.array(dtype=StrayTriangle)
+    triangles: wp.array(dtype=OutlierTriangle)
     boxes: wp.array(dtype=wp.float32)  # of eight each: per axis their lows, then their highs
 
 
@@ -37,23 +37,23 @@ BOX_MARGIN = 1.0e-6
 """Of the largest coordinate, by how much boxes, and a ray's start, are widened: some roundings of a float32."""
 
 
-def strays_of(mesh: Mesh, device: wp.Device) -> Any:
-    """The ``Strays`` of a mesh, on a device."""
-    made = Strays()
-    if len(mesh.strays) == 0:
-        made.triangles = wp.empty(0, dtype=StrayTriangle, device=device)
+def outliers_of(mesh: Mesh, device: wp.Device) -> Any:
+    """The ``Outliers`` of a mesh, on a device."""
+    made = Outliers()
+    if len(mesh.outliers) == 0:
+        made.triangles = wp.empty(0, dtype=OutlierTriangle, device=device)
         made.boxes = wp.empty(0, dtype=wp.float32, device=device)
         return made
     centre, half = mesh.unit_frame
-    corners = (mesh.vertices[mesh.faces[mesh.strays]] - centre) / half
+    corners = (mesh.vertices[mesh.faces[mesh.outliers]] - centre) / half
     a, b, c = np.moveaxis(corners, 1, 0)
     records = []
-    for k, triangle in enumerate(mesh.strays.tolist()):
-        record = StrayTriangle()
+    for k, triangle in enumerate(mesh.outliers.tolist()):
+        record = OutlierTriangle()
         record.a, record.triangle = wp.vec3d(*a[k]), triangle
         record.edge_u, record.edge_v = wp.vec3d(*(b[k] - a[k])), wp.vec3d(*(c[k] - a[k]))
         records.append(record)
-    made.triangles = wp.array(records, dtype=StrayTriangle, device=device)
+    made.triangles = wp.array(records, dtype=OutlierTriangle, device=device)
     boxes = np.zeros((-(-len(corners) // 8), 3, 2, 8), np.float32)
     margin = BOX_MARGIN * np.abs(corners).max(axis=(1, 2))[:, None]
     for side, bound in enumerate((corners.min(axis=1) - margin, corners.max(axis=1) + margin)):
