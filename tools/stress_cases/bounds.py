@@ -88,8 +88,8 @@ def scenes(step: int, folder: Path) -> list[Scene]:
     ldtrefl.save_image(sky, np.random.default_rng(1).random((6, 12, 3)).astype(np.float32))
     things = [thing for shape in shapes.names() for thing in variants(shape, SMALL.get(shape, {}), texture)][::step]
     things += list(variants("torus_knot", DENSE, texture))[:: max(step, 3)]
-    outlier = [[1e5, 0, 0], [1e5, 1, 0], [1e5, 0, 1]]
-    outlier = ldtrefl.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]] * 40 + outlier, np.arange(123).reshape(-1, 3))
+    far = [[1e5, 0, 0], [1e5, 1, 0], [1e5, 0, 1]]
+    outlier = ldtrefl.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]] * 40 + far, np.arange(123).reshape(-1, 3))
     things.append({"mesh": outlier, "smooth": False})
     rng = np.random.default_rng(2)
     objects = tuple(
