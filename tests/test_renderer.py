@@ -1,0 +1,142 @@
+"""What a ``Renderer`` promises: arrays are the caller's, and a call that fails or is stopped changes nothing."""
+
+import dataclasses
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from stress_cases.histories import difference
+
+import ldtrefl
+from ldtrefl import renderer as renderer_module
+from ldtrefl.device import launch
+from ldtrefl.renderer import Frame
+from ldtrefl.scene.description import Object
+from tests.frame_scenes import assert_as_fresh, scene
+
+
+def test_a_move_that_cannot_be_is_refused() -> None:
+    renderer = ldtrefl.Renderer(scene(), "ldt")
+    with pytest.raises(ldtrefl.InputError, match=r"unknown object 'toros'; did you mean 'torus'\?"):
+        renderer.move("toros", scale=2.0)
+    with pytest.raises(ldtrefl.InputError, match=r"scale: should be from 1e-15 to 1e\+15, got -1"):
+        renderer.move("torus", scale=-1.0)
+    with pytest.raises(ldtrefl.InputError, match=r"rotate: the axis must not be the zero vector"):
+        renderer.move("torus", rotate=(0, 0, 0, 10))
+
+
+def scribble(values: Any) -> None:
+    """Write into every array there is."""
+    for array in values:
+        array[...] = 1 if array.dtype == bool else 77
+
+
+def arrays_of(frame: Frame, drawn: Any) -> list[np.ndarray]:
+    assert frame.hits is not None
+    hits = [frame.hits.distance, frame.hits.object, frame.hits.triangle]
+    seen = [drawn.objects, drawn.triangles, drawn.reflector_mask]
+    surfaces = [array.numpy() for array in drawn.surfaces]
+    return [frame.image, frame.reflection, frame.reflector_mask, *hits, *seen, *surfaces]
+
+
+def test_arrays_that_are_handed_out_are_the_callers() -> None:
+    renderer = ldtrefl.Renderer(scene(), "ldt")
+    truth = ldtrefl.render(scene(), "ldt")
+    for _ in range(3):
+        frame = renderer.render()
+        assert renderer.gbuffer is not None and difference(frame, truth) == ""
+        scribble(arrays_of(frame, renderer.gbuffer))
+        frame = renderer.render()
+        assert difference(frame, truth) == ""
+    scribble(arrays_of(frame, renderer.gbuffer))
+    renderer.move("torus", translate=(-1.5, -1.1, 0.1))
+    assert_as_fresh(renderer, renderer.render())
+
+
+def test_arrays_of_a_frame_stay_as_they_are() -> None:
+    renderer = ldtrefl.Renderer(scene(), "ldt")
+    frame = renderer.render()
+    renderer.move("torus", translate=(-1.5, -1.1, 0.1))
+    renderer.render()
+    renderer.render(dataclasses.replace(scene().camera, eye=(1, -4, 2)))
+    assert difference(frame, ldtrefl.render(scene(), "ldt")) == ""
+
+
+class Stop(BaseException):
+    """Stands for Ctrl-C."""
+
+
+def stopping_at(monkeypatch: pytest.MonkeyPatch, launches: int) -> Callable[[], None]:
+    """Have the launch after so many raise ``Stop``, once; call what is returned to end that."""
+    whole, left = launch.launch, [launches]
+
+    def stopped(*arguments: Any) -> None:
+        left[0] -= 1
+        if left[0] == -1:
+            raise Stop
+        whole(*arguments)
+
+    modules = [module for name, module in sys.modules.items() if name.startswith("ldtrefl.")]
+    for module in modules:
+        if getattr(module, "launch", None) is whole:
+            monkeypatch.setattr(module, "launch", stopped)
+    return monkeypatch.undo
+
+
+@pytest.mark.parametrize("launches", range(0, 16, 3))
+def test_a_frame_that_is_stopped_leaves_nothing_half_done(launches: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    renderer = ldtrefl.Renderer(scene(), "ldt", error=1.0)
+    renderer.render()
+    renderer.move("torus", translate=(-1.2, -1.3, 0.1))
+    renderer.render()
+    renderer.move("knot", translate=(1.2, -1.3, 0.1))
+    go_on = stopping_at(monkeypatch, launches)
+    try:
+        renderer.render()
+    except Stop:
+        pass
+    go_on()
+    # What moved before the frame that was stopped, and what moves now.
+    assert_as_fresh(renderer, renderer.render(), error=1.0)
+    renderer.move("box", translate=(0.1, -1.7, -0.5))
+    assert_as_fresh(renderer, renderer.render(), error=1.0)
+
+
+def test_a_move_that_fails_leaves_all_as_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
+    renderer = ldtrefl.Renderer(scene(), "ldt")
+    before = renderer.render()
+    with pytest.raises(ldtrefl.InputError):
+        renderer.move("torus", translate=(1.0, 0.0, 0.0), scale=-1.0)
+
+    def fail(*_arguments: Any, **_named: Any) -> None:
+        raise Stop
+
+    monkeypatch.setattr(renderer_module, "DeviceScene", fail)
+    with pytest.raises(Stop):
+        renderer.move("torus", translate=(1.0, 0.0, 0.0))
+    monkeypatch.undo()
+    assert renderer.scene.objects == scene().objects
+    assert difference(renderer.render(), before) == ""
+
+
+def test_the_launches_of_a_frame_do_not_depend_on_the_number_of_objects(monkeypatch: pytest.MonkeyPatch) -> None:
+    counts = []
+    for objects in (10, 400):
+        boxes = [Object(shape="box", scale=0.05, translate=(0.1 * k - 2, -2, -1)) for k in range(objects)]
+        many = scene(objects=(*scene().objects[:1], *boxes))
+        # Meshes are made by launches of their own, as many for each mesh; objects share them.
+        assert len({id(entry.geometry.unit_vertices) for entry in many.objects}) == 2
+        made = [0]
+        whole = launch.launch
+
+        def counted(*arguments: Any, whole: Any = whole, made: list[int] = made) -> None:
+            made[0] += 1
+            whole(*arguments)
+
+        monkeypatch.setattr(launch, "launch", counted)
+        ldtrefl.render(many, "bvh")
+        monkeypatch.undo()
+        counts.append(made[0])
+    assert counts[0] == counts[1] < 20, counts
