@@ -10,14 +10,12 @@ STILL_TO_MEND: dict[str, dict[str, list[str]]] = {
         "ldtrefl/scene/description.py": ["the file"],
         "ldtrefl/scene/shapes.py": ["the file"],
         "ldtrefl/world/device_scene.py": ["the file"],
-        "tools/stress_cases/judge.py": ["the file"],
         "tests/files/test_map_cache.py": ["the file"],
         "ldtrefl/ldt/exact/walk.h": ["the file"],
     },
     "functions of at most 60 lines": {
         "ldtrefl/frame/reflect.py": ["closest_hits_kernel", "closest_hits_kernel.closest_hits"],
         "ldtrefl/ldt/exact/patches.py": ["survey_triangles"],
-        "tools/stress_cases/kills.py": ["run"],
     },
     "no public parameter typed Any": {
         "ldtrefl/base/checked.py": ["plain(value)"],

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 
-from stress_cases.judge import Outcome, as_dict
+from stress_cases.outcomes import Outcome, as_dict
 
 from ldtrefl.base.errors import InputError
 from ldtrefl.files.whole import written_whole

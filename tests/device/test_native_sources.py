@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import warp as wp
-from stress_cases.judge import rays_about
+from stress_cases.inputs import rays_about
 
 import ldtrefl
 from ldtrefl.device import native_sources

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from stress_cases.judge import rays_about
+from stress_cases.inputs import rays_about
 
 import ldtrefl
 from ldtrefl.base import budget

@@ -11,8 +11,11 @@ import numpy as np
 import pytest
 from stress import CASES, load
 from stress_cases.files import MEMORY, SECONDS, Case, fault_of_picture, fault_of_process
-from stress_cases.judge import DENSE, EXACT, Truth, judge, rays_about
+from stress_cases.inputs import rays_about
+from stress_cases.judge import judge
+from stress_cases.outcomes import DENSE, EXACT
 from stress_cases.pictures import Held, Reference, judge_frame, shows_enough, surroundings
+from stress_cases.truth import Truth
 
 import ldtrefl
 from ldtrefl.scene import shapes

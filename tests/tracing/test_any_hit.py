@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from stress_cases import edges
 from stress_cases.edge_truth import Surface
-from stress_cases.judge import brute_force, rays_about
+from stress_cases.inputs import rays_about
+from stress_cases.truth import brute_force
 
 import ldtrefl
 from ldtrefl.scene import shapes

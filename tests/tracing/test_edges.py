@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from stress_cases import edges
 from stress_cases.edge_truth import ALLOWANCE, Right, Surface, examine, what_is_right
-from stress_cases.judge import brute_force
+from stress_cases.truth import brute_force
 
 import ldtrefl
 

@@ -7,7 +7,7 @@ import pytest
 import warp as wp
 from embreex import rtcore_scene
 from embreex.mesh_construction import TriangleMesh
-from stress_cases.judge import rays_about
+from stress_cases.inputs import rays_about
 
 import ldtrefl
 from ldtrefl.scene import shapes

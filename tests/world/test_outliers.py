@@ -7,7 +7,8 @@ import sys
 import numpy as np
 import pytest
 from stress_cases import outliers
-from stress_cases.judge import Outcome, brute_force
+from stress_cases.outcomes import Outcome
+from stress_cases.truth import brute_force
 
 import ldtrefl
 from ldtrefl.ldt.exact import build

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 from stress_cases import shadows
-from stress_cases.judge import Outcome
+from stress_cases.outcomes import Outcome
 
 import ldtrefl
 from ldtrefl.scene import shapes

@@ -22,7 +22,7 @@ from ldtrefl.frame import skips
 from ldtrefl.scene import shapes
 from ldtrefl.scene.description import Camera, Environment, Light, Lighting, Material, Object, Scene
 
-from .judge import Outcome
+from .outcomes import Outcome
 
 NAME = "14 bounds"
 SMALL: dict[str, dict[str, Any]] = {

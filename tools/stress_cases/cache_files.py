@@ -31,7 +31,8 @@ from ldtrefl.ldt.texture import peel_mesh
 from ldtrefl.scene import shapes
 from ldtrefl.world.device_scene import DeviceMesh
 
-from .judge import Outcome, rays_about
+from .inputs import rays_about
+from .outcomes import Outcome
 
 NAME = "15 cache files"
 SECONDS = 20

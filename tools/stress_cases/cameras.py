@@ -8,7 +8,7 @@ import numpy as np
 
 import ldtrefl
 
-from .judge import Outcome
+from .outcomes import Outcome
 from .pictures import Held, judge_reflections, surroundings
 
 NAME = "6 cameras"

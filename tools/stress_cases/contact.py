@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ldtrefl
 
-from .judge import Outcome
+from .outcomes import Outcome
 from .pictures import judge_reflections
 
 NAME = "5 contact"

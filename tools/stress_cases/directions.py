@@ -9,7 +9,9 @@ import numpy as np
 import ldtrefl
 from ldtrefl.scene import shapes
 
-from .judge import Limit, Outcome, judge_mesh, limits, linear_limit, rays_about, tracers
+from .inputs import rays_about, tracers
+from .judge import judge_mesh
+from .outcomes import Limit, Outcome, limits, linear_limit
 
 NAME = "2 directions"
 GRAZING = limits(

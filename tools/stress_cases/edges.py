@@ -20,7 +20,7 @@ import ldtrefl
 from ldtrefl.scene import shapes
 
 from .edge_truth import LADDER, Right, Surface, examine, what_is_right
-from .judge import TEXELS, Outcome
+from .outcomes import TEXELS, Outcome
 
 NAME = "20 edges"
 

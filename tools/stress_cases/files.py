@@ -29,8 +29,8 @@ import ldtrefl
 from ldtrefl.cli import commands
 
 from . import mutations
-from .judge import Outcome
 from .mutations import LOOP, MESHES, PICTURES
+from .outcomes import Outcome
 
 NAME = "12 files"
 

@@ -13,7 +13,10 @@ import ldtrefl
 from ldtrefl.ldt.exact.record_choice import FEW_TRIANGLES, Quality
 from ldtrefl.scene import shapes
 
-from .judge import DENSE, TEXELS, Limit, Outcome, Truth, describe, judge, linear_limit, moved
+from .inputs import moved
+from .judge import judge
+from .outcomes import DENSE, TEXELS, Limit, Outcome, describe, linear_limit
+from .truth import Truth
 
 NAME = "11 fuzz"
 RAYS = (1000, 5000)

@@ -20,7 +20,7 @@ import numpy as np
 
 import ldtrefl
 
-from .judge import Outcome
+from .outcomes import Outcome
 
 NAME = "16 histories"
 

@@ -15,7 +15,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from .judge import Outcome
+from .outcomes import Outcome
 
 NAME = "17 hostile inputs"
 SECONDS = 20

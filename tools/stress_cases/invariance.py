@@ -10,9 +10,12 @@ import ldtrefl
 from ldtrefl.device import cpu_threads
 from ldtrefl.scene import shapes
 
-from .judge import Outcome, Truth, judge, limits, rays_about, tracers
+from .inputs import rays_about, tracers
+from .judge import judge
+from .outcomes import Outcome, limits
 from .pictures import METHODS, not_finite
 from .place import scene_at
+from .truth import Truth
 
 NAME = "9 invariance"
 SPREAD = 2.0

@@ -7,7 +7,9 @@ import numpy as np
 import ldtrefl
 from ldtrefl.scene import shapes
 
-from .judge import DENSE, TEXELS, Limit, Outcome, judge_mesh, limits, linear_limit, moved, rays_about
+from .inputs import moved, rays_about
+from .judge import judge_mesh
+from .outcomes import DENSE, TEXELS, Limit, Outcome, limits, linear_limit
 
 NAME = "4 meshes"
 NEEDLES = limits(

@@ -8,7 +8,7 @@ import numpy as np
 
 import ldtrefl
 
-from .judge import Outcome
+from .outcomes import Outcome
 from .pictures import METHODS, not_finite
 
 NAME = "10 motion"

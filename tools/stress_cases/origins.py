@@ -6,7 +6,8 @@ import numpy as np
 
 from ldtrefl.scene import shapes
 
-from .judge import Limit, Outcome, judge_mesh, limits, linear_limit
+from .judge import judge_mesh
+from .outcomes import Limit, Outcome, limits, linear_limit
 
 NAME = "3 origins"
 TOUCHING = limits(

@@ -14,7 +14,8 @@ import numpy as np
 import ldtrefl
 from ldtrefl.scene import shapes
 
-from .judge import Outcome, brute_force
+from .outcomes import Outcome
+from .truth import brute_force
 
 NAME = "18 outliers"
 KNOT = {"segments": [64, 16]}

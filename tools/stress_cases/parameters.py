@@ -7,7 +7,10 @@ import time
 import ldtrefl
 from ldtrefl.scene import shapes
 
-from .judge import LINEAR, Limit, Outcome, Truth, describe, judge, judge_mesh, limits, linear_limit, moved, rays_about
+from .inputs import moved, rays_about
+from .judge import judge, judge_mesh
+from .outcomes import LINEAR, Limit, Outcome, describe, limits, linear_limit
+from .truth import Truth
 
 NAME = "8 parameters"
 ANY = limits(linear=linear_limit(100.0, "a texel may be as large as the object: finite answers alone"))

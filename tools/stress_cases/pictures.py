@@ -12,7 +12,8 @@ import ldtrefl
 from ldtrefl.scene import shapes
 from ldtrefl.world.camera import camera_axes
 
-from .judge import LINEAR_WORST, TEXELS, Outcome, Truth
+from .outcomes import LINEAR_WORST, TEXELS, Outcome
+from .truth import Truth
 
 OFF = 0.5
 """Texels from the true distance beyond which a reflected ray ends elsewhere."""

@@ -7,7 +7,9 @@ import numpy as np
 import ldtrefl
 from ldtrefl.scene import shapes
 
-from .judge import Limit, Outcome, judge_mesh, limits, linear_limit, moved, rays_about
+from .inputs import moved, rays_about
+from .judge import judge_mesh
+from .outcomes import Limit, Outcome, limits, linear_limit
 from .pictures import judge_same_pictures
 
 SAME_PICTURE = 0.1

@@ -7,7 +7,7 @@ import numpy as np
 import ldtrefl
 from ldtrefl.scene import shapes
 
-from .judge import Outcome
+from .outcomes import Outcome
 from .pictures import Held, judge_reflections, surroundings
 
 NAME = "7 reflectors"

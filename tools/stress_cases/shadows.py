@@ -14,7 +14,7 @@ import ldtrefl
 from ldtrefl.scene.description import Camera, Light, Lighting, Material, Object, Scene
 from ldtrefl.world.camera import camera_axes
 
-from .judge import Outcome
+from .outcomes import Outcome
 
 NAME = "19 shadows"
 WHITE = Material(albedo=(1, 1, 1))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 from benchmark_parts.rays import mirror_rays
-from stress_cases.judge import rays_about
+from stress_cases.inputs import rays_about
 
 import ldtrefl
 from ldtrefl.device import launch

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 import warp as wp
-from stress_cases.judge import rays_about
+from stress_cases.inputs import rays_about
 
 import ldtrefl
 from ldtrefl.device import launch
