@@ -133,13 +133,34 @@ def kernels_without_a_line(path: str) -> list[str]:
     return [name for name, node, _ in named(tree_of(path)) if is_kernel(node) and not ast.get_docstring(node)]
 
 
+@functools.cache
+def classes() -> dict[str, ast.ClassDef]:
+    """All classes of what users import and run, by name."""
+    return {node.name: node for path in PYTHON for node in ast.walk(tree_of(path)) if isinstance(node, ast.ClassDef)}
+
+
+def is_said_by_a_base(owner: ast.ClassDef, method: str) -> bool:
+    """Whether a class that this one is derived from has a docstring for a method of this name."""
+    for base in owner.bases:
+        found = classes().get(getattr(base, "attr", getattr(base, "id", "")))
+        if found is None:
+            continue
+        own = [node for node in found.body if isinstance(node, Function) and node.name == method]
+        if any(ast.get_docstring(node) for node in own) or is_said_by_a_base(found, method):
+            return True
+    return False
+
+
 def without_docstring(path: str) -> list[str]:
-    """The module, public classes, functions and methods that have no docstring; of a test the module alone."""
+    """The module, public classes, functions and methods that have no docstring; of a test the module alone. A method
+    that a base class says something about needs to say nothing."""
     found = [] if ast.get_docstring(tree_of(path)) or not text_of(path) else ["the module"]
     if path.startswith("tests/"):
         return found
     for name, node, is_public in named(tree_of(path)):
+        owner = classes().get(name.split(".")[-2]) if "." in name else None
         is_said = bool(ast.get_docstring(node)) or is_kernel(node) or "setter" in decorators(node)
+        is_said = is_said or (owner is not None and is_said_by_a_base(owner, node.name))
         if is_public and not is_said:
             found.append(name)
     return found

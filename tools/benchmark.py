@@ -21,7 +21,6 @@ import dataclasses
 import json
 import sys
 from pathlib import Path
-from typing import Any
 
 import warp as wp
 from benchmark_parts import cores
@@ -34,6 +33,7 @@ from benchmark_parts.ours import OURS
 from benchmark_parts.paper import paper_tables
 from benchmark_parts.rays import KINDS, RAYS
 from benchmark_parts.report import draw_plots, of_fastest, reading
+from benchmark_parts.result import Result
 from benchmark_parts.rivals import RIVALS, available
 from benchmark_parts.threads import thread_scaling
 from benchmark_parts.tracing import Plan, rays_line, rays_on_mesh
@@ -49,13 +49,13 @@ QUICK_MESHES = ("knot 1 k", "knot 10 k", "knot 10 k outlier 1e3")
 QUICK_RAYS = 8000
 
 OUTLIER_TRACERS = ("ldt", "bvh", "embreex")
-"""Whom a full run times with outliers, on one thread: they are many, and a tree does not mind them."""
+"""The tracers that a full run times on meshes with outliers, on one thread: those meshes are many."""
 
 
 def main() -> None:
     """Run the parts that are wanted and write JSON, Markdown and plots."""
     arguments = _arguments()
-    result: dict[str, Any] = {}
+    result: Result = {}
     try:
         measure(arguments, result)
     except KeyboardInterrupt:
@@ -108,7 +108,7 @@ def _arguments() -> argparse.Namespace:
     return arguments
 
 
-def measure(arguments: argparse.Namespace, result: dict[str, Any]) -> None:
+def measure(arguments: argparse.Namespace, result: Result) -> None:
     """The figures of the parts that are wanted, into ``result`` one by one: what is done when stopped is not lost."""
     quick, wanted = arguments.quick, arguments.only
     rivals, notes = available(arguments.tracers)

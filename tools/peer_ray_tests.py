@@ -1,11 +1,11 @@
 """The ray tests of trimesh and of Open3D, run on our tracers from copies that the user has.
 
-    python tools/peer_ray_tests.py --trimesh ~/trimesh --open3d ~/Open3D
+    python tools/peer_ray_tests.py --trimesh ~/trimesh --open3d ~/Open3D   # a minute; prints what passed
 
 The paths are those of checkouts of their repositories; nothing of theirs is in ours, and Open3D need not be installed.
 Each suite runs once for each tracer, in a process of its own, with an adapter in the place of the library's tracer
-(``peer_adapters``). A test *does not apply* that asks what no ray answers, or needs a package that is missing; it
-says which. Exit status 1 if a test fails.
+(``peer_adapters``). A test *does not apply* if it asks for what no ray can answer, or needs a package that is missing:
+the output names it. The exit status is 1 if a test fails.
 """
 
 from __future__ import annotations
@@ -27,7 +27,10 @@ SUITES = {
 """The files of tests in a checkout of each library."""
 
 MARK = "PEER "
-"""Begins the lines that a child prints for its parent."""
+"""What the lines begin with that a child prints for its parent."""
+
+SHOWN = 2000
+"""Characters from the end of a child's output that are shown when it breaks off."""
 
 
 @dataclass
@@ -70,7 +73,7 @@ def run_suite(suite: str, by: str, root: Path) -> list[tuple[str, str, str]]:
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     lines = [line.split(MARK, 1)[1] for line in done.stdout.splitlines() if MARK in line]
     if done.returncode not in (0, 1) or not lines:
-        raise RuntimeError(f"{suite} by {by}: {done.stdout[-2000:]}{done.stderr[-2000:]}")
+        raise RuntimeError(f"{suite} by {by}: {done.stdout[-SHOWN:]}{done.stderr[-SHOWN:]}")
     return [tuple(line.split("|", 2)) for line in lines]  # type: ignore[misc]
 
 

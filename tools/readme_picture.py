@@ -1,11 +1,12 @@
 """Renders the README's pictures: a scene by layered depth textures with the ray-traced truth inset, and peeled layers.
 
-python tools/readme_picture.py [FOLDER]
+python tools/readme_picture.py             # a few seconds; writes docs/teapot.png and docs/layers.png
+python tools/readme_picture.py FOLDER      # the same into another folder
 """
 
 from __future__ import annotations
 
-import sys
+import argparse
 from pathlib import Path
 
 import numpy as np
@@ -16,14 +17,28 @@ from ldtrefl.scene import shapes
 
 ROOT = Path(__file__).parent.parent
 CROP = (slice(182, 342), slice(288, 528))
-"""Rows and columns of the truth that the inset shows: the ball's reflections."""
+"""Rows and columns of the ray-traced picture that the inset shows: the reflections in the ball."""
+
 FRAME = 3
-"""Pixels of the inset's white frame."""
+"""Width of the inset's white frame, pixels."""
+
+MAP_RESOLUTION = 192
+"""Texels along a side of the layers' picture: it shall not be larger than the README is wide."""
 
 
 def main() -> None:
-    """Write teapot.png and layers.png."""
-    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "docs"
+    """Write both pictures."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path, nargs="?", default=ROOT / "docs", help="where the pictures go")
+    folder = parser.parse_args().folder
+    ldtrefl.save_image(folder / "teapot.png", picture_with_inset())
+    shape = shapes.make("genus3")
+    maps = ldtrefl.peel(shape.vertices, shape.faces, resolution=MAP_RESOLUTION)
+    ldtrefl.save_image(folder / "layers.png", draw_layers(maps))
+
+
+def picture_with_inset() -> np.ndarray:
+    """(h, w, 3) float32: the teapot's scene, with a part of the ray-traced picture in its upper right corner."""
     scene = ldtrefl.load_scene(ROOT / "scenes" / "teapot.toml")
     picture = ldtrefl.render(scene, "ldt").image.copy()
     inset = ldtrefl.render(scene, "bvh").image[CROP]
@@ -31,9 +46,7 @@ def main() -> None:
     framed = np.ones((height + 2 * FRAME, width + 2 * FRAME, 3), np.float32)
     framed[FRAME:-FRAME, FRAME:-FRAME] = inset
     picture[: framed.shape[0], -framed.shape[1] :] = framed
-    ldtrefl.save_image(folder / "teapot.png", picture)
-    shape = shapes.make("genus3")
-    ldtrefl.save_image(folder / "layers.png", draw_layers(ldtrefl.peel(shape.vertices, shape.faces, resolution=192)))
+    return picture
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Timing things in turn in one process (A B A B ...)."""
+"""Times things in turn in one process (A B A B ...), so that whatever slows the machine slows all of them."""
 
 from __future__ import annotations
 
@@ -6,16 +6,25 @@ import math
 import statistics
 import time
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import TypedDict
+
+
+class Summary(TypedDict):
+    """Milliseconds of one job over all its rounds."""
+
+    median: float
+    min: float
+    max: float
 
 
 def in_turn(
-    jobs: Mapping[str, Callable[[], Any]], rounds: int, most_seconds: float = math.inf
+    jobs: Mapping[str, Callable[[], object]], rounds: int, most_seconds: float = math.inf
 ) -> dict[str, list[float]]:
-    """Milliseconds of each job in each round: what it took, or the seconds that it returns itself.
+    """Milliseconds of each job in each round: what its call took, or the seconds that the call returns if it gives a
+    float.
 
-    One round first does not count. Every other round goes backwards, so that no job always comes after the same one.
-    No round is begun ``most_seconds`` after the first; if that leaves none, the first one counts.
+    A first round is run that does not count. Every other round goes backwards, so that no job always comes after the
+    same one. No round begins later than ``most_seconds`` after the first did; if none does, the first one counts.
     """
     spent: dict[str, list[float]] = {name: [] for name in jobs}
     begun = time.perf_counter()
@@ -33,13 +42,13 @@ def in_turn(
     return spent
 
 
-def summary(values: list[float]) -> dict[str, float]:
+def summary(values: list[float]) -> Summary:
     """Median, fastest and slowest."""
     return {"median": statistics.median(values), "min": min(values), "max": max(values)}
 
 
 def timed_in_turn(
-    jobs: Mapping[str, Callable[[], Any]], rounds: int, most_seconds: float = math.inf
-) -> dict[str, dict[str, float]]:
+    jobs: Mapping[str, Callable[[], object]], rounds: int, most_seconds: float = math.inf
+) -> dict[str, Summary]:
     """The summary of each job's milliseconds."""
     return {name: summary(values) for name, values in in_turn(jobs, rounds, most_seconds).items()}

@@ -5,9 +5,9 @@ import pytest
 from benchmark_parts import ratios, report, rivals, tables
 from benchmark_parts.models import model
 from benchmark_parts.rays import KINDS, RAYS, Rays, enters, kinds_of, second_bounce
+from benchmark_parts.result import RaysRow
 from benchmark_parts.rivals import Embreex, Rival, available
 from benchmark_parts.truth import EDGE, Model, errors_of, truth
-from timing import in_turn
 
 FEW = 2000
 
@@ -118,7 +118,7 @@ def test_errors_are_percent_of_true_hits_and_texels() -> None:
     assert wrong["same_triangle"] == pytest.approx(200 / 3)
 
 
-def row(mesh: str, **milliseconds: float) -> ratios.Row:
+def row(mesh: str, **milliseconds: float) -> RaysRow:
     """Two kinds of 1,000 rays, the second twice as slow, and an any-hit one; a tracer's times."""
     kinds = {}
     for i, kind in enumerate(("one", "two", "any")):
@@ -138,14 +138,6 @@ def test_ratios_are_of_the_times_that_they_name() -> None:
         {"mesh": "knot 96 k outlier 1e3", "form": "kernel", "tracer": "ldt", "median": 4.0, "worst": 4.0}
     ]
     assert len(ratios.slower_than_bvh(rows, ["1"])) == 3
-
-
-def test_rounds_end_with_the_time_allowed() -> None:
-    """One counts in any case, the first if need be; else the first never does."""
-    calls: list[float] = []
-    slow = {"slow": lambda: calls.append(1.0) or 0.5}
-    assert in_turn(slow, 5, most_seconds=0.0) == {"slow": [500.0]} and len(calls) == 1
-    assert in_turn(slow, 3) == {"slow": [500.0] * 3} and len(calls) == 1 + 4
 
 
 def test_fastest_rounds_take_the_medians_place() -> None:

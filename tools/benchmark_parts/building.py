@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Sequence
-from typing import Any
 
 from timing import timed_in_turn
 
 import ldtrefl
 from ldtrefl.device import launch
-from ldtrefl.ldt.texture import peel_mesh
+from ldtrefl.ldt.texture import LayeredDepthTexture, peel_mesh
 from ldtrefl.tracing.bvh import Raycaster
 from ldtrefl.world.device_scene import DeviceMesh
 
@@ -18,13 +17,20 @@ from .cores import one_core
 from .models import Model
 from .ours import Caster, Exact, Fast, Linear, Peeled
 from .ray_tracer import RayTracer
+from .result import BuildRow, Times
 
-MAKERS: dict[str, Callable[[DeviceMesh], Any]] = {
+PEELERS: dict[str, Callable[[DeviceMesh], LayeredDepthTexture]] = {
     Peeled.name: peel_mesh,
-    Caster.name: Raycaster.of,
     Exact.name: functools.partial(peel_mesh, quality="exact"),
     Fast.name: functools.partial(peel_mesh, quality="fast"),
     Linear.name: functools.partial(peel_mesh, search="linear"),
+}
+"""What peels a mesh that is on the device already, by name."""
+
+MAKERS: dict[str, Callable[[DeviceMesh], LayeredDepthTexture | Raycaster]] = {
+    Peeled.name: peel_mesh,
+    Caster.name: Raycaster.of,
+    **PEELERS,
 }
 """What builds on a mesh that is on the device already, by name."""
 
@@ -32,18 +38,16 @@ MOST_SECONDS = 6.0
 """For the rounds of one mesh, on one number of threads: large ones are built once or twice by each."""
 
 
-def builds_of_mesh(
-    mesh: Model, tracers: Sequence[type[RayTracer]], rounds: int, counts: Sequence[int]
-) -> dict[str, Any]:
+def builds_of_mesh(mesh: Model, tracers: Sequence[type[RayTracer]], rounds: int, counts: Sequence[int]) -> BuildRow:
     """Milliseconds and bytes: "numpy" from arrays, "kernel" for a mesh that is on the device already."""
     some = [kind for kind in tracers if len(mesh.faces) <= kind.most_triangles]
     geometry = DeviceMesh(ldtrefl.Mesh(mesh.vertices, mesh.faces), launch.resolve_device(None))
     makers = {
         name: functools.partial(make, geometry) for name, make in MAKERS.items() if name in [k.name for k in some]
     }
-    found: dict[str, Any] = {}
+    found: Times = {}
     for count in counts:
-        jobs: dict[tuple[str, str], Callable[[], Any]] = {("kernel", name): make for name, make in makers.items()}
+        jobs: dict[tuple[str, str], Callable[[], object]] = {("kernel", name): make for name, make in makers.items()}
         for kind in some:
             kind.set_threads(count)
             if kind.is_default:
@@ -57,7 +61,7 @@ def builds_of_mesh(
         "mesh": mesh.name,
         "triangles": len(mesh.faces),
         "milliseconds": found,
-        "bytes": {name: make().nbytes for name, make in makers.items() if name != Caster.name},
+        "bytes": {name: peel(geometry).nbytes for name, peel in PEELERS.items() if name in makers},
     }
 
 
@@ -70,7 +74,8 @@ def _on_one_core(kind: type[RayTracer], mesh: Model) -> RayTracer:
         return _build(kind, mesh)
 
 
-def build_line(row: dict[str, Any]) -> str:
+def build_line(row: BuildRow) -> str:
+    """The mesh and the milliseconds of builds from numpy arrays, by number of threads."""
     parts = []
     for count, forms in row["milliseconds"].items():
         times = ", ".join(f"{name} {entry['median']:.1f}" for name, entry in forms["numpy"].items())

@@ -1,7 +1,6 @@
 """The scenes and kernels that the benchmark's parts share."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import warp as wp
@@ -14,7 +13,7 @@ from ldtrefl.tracing.trace import Tracer, array_of_views, batch_kernel, block_of
 ROOT = Path(__file__).parent.parent.parent
 
 SKIPS_BUT_FRAMES = [name for name in skips.names() if name != "frames"]
-"""So that every frame is made anew."""
+"""Every skip but that of a frame which is the same as the last: so each frame is made anew, and can be timed."""
 
 
 UNIT_SPACE = np.zeros(3), 1.0
@@ -27,7 +26,7 @@ class Batch:
     def __init__(
         self,
         tracer: Tracer,
-        view: Any,
+        view: object,
         origins: wp.array,
         directions: wp.array,
         unit_frame: tuple[np.ndarray, float] = UNIT_SPACE,

@@ -19,9 +19,10 @@ from ldtrefl.scene.description import Scene
 
 from .common import ROOT, SKIPS_BUT_FRAMES, knot_scene
 from .paper import PAPER_TABLE_2
+from .result import ErrorPoint, ErrorTarget
 
 
-def error_against_time(quick: bool, rounds: int) -> list[dict[str, Any]]:
+def error_against_time(quick: bool, rounds: int) -> list[ErrorPoint]:
     """Frames of the ball and the knot by every method and parameter: time per frame, maps kept, and image error."""
     ldtrefl.set_threads()
     size = (192, 128) if quick else (768, 512)
@@ -41,7 +42,7 @@ def error_against_time(quick: bool, rounds: int) -> list[dict[str, Any]]:
         curves.append(("ldt linear", f"{steps} steps", scene, "ldt", {"search": "linear", "linear_steps": steps}))
     for resolution in (64, 256) if quick else (64, 128, 256, 512, 1024):
         curves.append(("envmap", f"{resolution}", scene, "envmap", {"resolution": resolution}))
-    points = []
+    points: list[ErrorPoint] = []
     renderers = [Renderer(where, method, skip=SKIPS_BUT_FRAMES, **options) for _, _, where, method, options in curves]
     jobs = {str(i): renderer.render for i, renderer in enumerate(renderers)}
     times = timed_in_turn(jobs, max(2, rounds // 2))
@@ -61,10 +62,10 @@ def error_against_time(quick: bool, rounds: int) -> list[dict[str, Any]]:
     return points
 
 
-def frame_stages(quick: bool, rounds: int) -> dict[str, Any]:
-    """Where the time of a frame goes, nothing kept but the kernels; and how march and peel scale with threads."""
+def frame_stages(quick: bool, rounds: int) -> dict[str, dict[str, float]]:
+    """Where the time of a frame goes, nothing kept but the kernels."""
     scene = knot_scene((200, 25) if quick else (2000, 125), *((192, 128) if quick else (768, 512)))
-    stages: dict[str, Any] = {}
+    stages: dict[str, dict[str, float]] = {}
     for threads in sorted({1, min(2, os.cpu_count() or 1)}):
         ldtrefl.set_threads(threads)
         for method in ("ldt", "bvh"):
@@ -87,7 +88,7 @@ def _median_stages(frames: list[dict[str, float]]) -> dict[str, float]:
     return rows | {"total": 1000 * statistics.median(sum(frame.values()) for frame in frames)}
 
 
-def error_targets(quick: bool, rounds: int) -> list[dict[str, Any]]:
+def error_targets(quick: bool, rounds: int) -> list[ErrorTarget]:
     """What ``error`` asks for and what comes of it: pixels, bytes and milliseconds beside the usual resolution."""
     ldtrefl.set_threads()
     found = {}
@@ -99,7 +100,7 @@ def error_targets(quick: bool, rounds: int) -> list[dict[str, Any]]:
     if "three_dancers" in found:
         found["three_dancers, far"] = _farther(found["three_dancers"], 2.5)
         found["three_dancers, very far"] = _farther(found["three_dancers"], 8.0)
-    rows = []
+    rows: list[ErrorTarget] = []
     for name, scene in found.items():
         truth = ldtrefl.render(scene, "bvh")
         for search, error in itertools.product(("exact", "linear"), (None, 0.5, 2.0)):

@@ -15,28 +15,30 @@ import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from .models import Model, load
 from .ours import Caster, Exact, Ours, Peeled
 from .ray_tracer import RayTracer
+from .result import Memory, MemoryRow
 from .rivals import RIVALS, Rival
 
 MEMORY_MESHES = ("knot 10 k", "knot 96 k", "knot 2 M", "knot 10 M", "lucy.ply loop 2 rough")
-"""Of a full run."""
+"""The meshes of a full run."""
 
 SMALL = "knot 1 k"
+"""The mesh that a process builds first, so that code and pools are there."""
 SECONDS = 300.0
+"""After which a builder's process is given up."""
 
 EVERYBODY: tuple[type[RayTracer], ...] = (Peeled, Exact, Caster, *(kind for kind in RIVALS if kind.is_default))
 
 
-def memory_of_mesh(mesh: Model, tracers: Sequence[type[RayTracer]]) -> dict[str, Any]:
+def memory_of_mesh(mesh: Model, tracers: Sequence[type[RayTracer]]) -> MemoryRow:
     """Bytes kept and at the peak, by builder."""
     names = [kind.name for kind in tracers if kind in EVERYBODY and len(mesh.faces) <= kind.most_triangles]
-    builders = {}
+    builders: dict[str, Memory] = {}
     with tempfile.TemporaryDirectory() as folder:
         np.save(Path(folder) / "vertices.npy", mesh.vertices.astype(np.float64))
         np.save(Path(folder) / "faces.npy", mesh.faces)
@@ -49,13 +51,13 @@ def memory_of_mesh(mesh: Model, tracers: Sequence[type[RayTracer]]) -> dict[str,
     return {"mesh": mesh.name, "triangles": len(mesh.faces), "mesh_bytes": own, "builders": builders}
 
 
-def memory_line(row: dict[str, Any]) -> str:
+def memory_line(row: MemoryRow) -> str:
     """The peaks, times the mesh's own bytes."""
     peaks = ", ".join(f"{name} {entry['peak'] / row['mesh_bytes']:.2f}" for name, entry in row["builders"].items())
     return f"{row['mesh']:26s} {row['triangles']:9d}  peak memory while building, of the mesh's own bytes: {peaks}"
 
 
-def _growth(name: str, folder: Path) -> dict[str, int]:
+def _growth(name: str, folder: Path) -> Memory:
     """What this process grows by when it builds."""
     builder = next(kind for kind in EVERYBODY if kind.name == name)
     if issubclass(builder, Rival):
@@ -72,7 +74,7 @@ def _growth(name: str, folder: Path) -> dict[str, int]:
     Path("/proc/self/clear_refs").write_text("5")  # the peak counts from now
     before = _status("VmRSS")
     built = builder(vertices, faces)
-    found = {"kept": max(_status("VmRSS") - before, 0), "peak": max(_status("VmHWM") - before, 0)}
+    found: Memory = {"kept": max(_status("VmRSS") - before, 0), "peak": max(_status("VmHWM") - before, 0)}
     del built
     return found
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 import warp as wp
 
 import ldtrefl
 from ldtrefl.device import launch
+from ldtrefl.ldt.exact.record_choice import Quality
 from ldtrefl.ldt.searches import TRACERS
 from ldtrefl.tracing.bvh import BVH
 from ldtrefl.tracing.trace import Tracer
@@ -24,10 +25,11 @@ class Ours(RayTracer):
     """A structure of ours over one mesh."""
 
     tracer: Tracer
-    """Of its kernels."""
-    built: Any
+    """What its kernels are built from."""
+    built: ldtrefl.LayeredDepthTexture | ldtrefl.Raycaster
     """The public object."""
-    view: Any
+    view: object
+    """What its kernels read of the mesh."""
 
     @classmethod
     def set_threads(cls, threads: int) -> None:
@@ -42,7 +44,7 @@ class Ours(RayTracer):
     def occluded(self, rays: Rays) -> np.ndarray:
         return self.built.occluded(rays.origins, rays.directions)
 
-    def prepared(self, rays: Rays) -> Callable[[], Any]:
+    def prepared(self, rays: Rays) -> Callable[[], object]:
         """The kernel over rays that lie in Warp's arrays."""
         device, unit_frame = launch.resolve_device(None), self.built.geometry.mesh.unit_frame
         origins, directions = (wp.array(x, dtype=wp.vec3, device=device) for x in (rays.origins, rays.directions))
@@ -68,7 +70,8 @@ class Peeled(Ours):
     """``peel(V, F)`` as it is by default."""
 
     name = "ldt"
-    quality: ClassVar[Any] = "balanced"
+    built: ldtrefl.LayeredDepthTexture
+    quality: ClassVar[Quality] = "balanced"
     search: ClassVar[str] = "exact"
 
     def __init__(self, vertices: np.ndarray, faces: np.ndarray) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import statistics
-from typing import Any
 
 from timing import timed_in_turn
 
@@ -17,6 +16,7 @@ from ldtrefl.world.device_scene import DeviceMesh
 
 from .common import ROOT, SKIPS_BUT_FRAMES
 from .models import load
+from .result import PaperModel, PaperScene, PaperTables
 
 PAPER_TABLE_1 = {  # model: triangles, layers, milliseconds on an NVIDIA GeForce 7800 (Zhang, Hsieh and Shen)
     "Ball": (1520, 1, 24.783),
@@ -58,11 +58,11 @@ PAPER_TABLE_2 = {  # scene: milliseconds for reflector and reflection on the sam
 }
 
 
-def paper_tables(quick: bool, rounds: int) -> dict[str, Any]:
+def paper_tables(quick: bool, rounds: int) -> PaperTables:
     """The paper's Tables 1 and 2 beside ours: their milliseconds on a GeForce 7800, ours on this CPU."""
     ldtrefl.set_threads()
     device = launch.resolve_device(None)
-    table_1: dict[str, Any] = {}
+    table_1: dict[str, PaperModel] = {}
     for model, (triangles, layers, milliseconds) in PAPER_TABLE_1.items():
         name = OUR_MODELS[model]
         mesh = load(name) if not quick or name in shapes.names() else None
@@ -72,7 +72,7 @@ def paper_tables(quick: bool, rounds: int) -> dict[str, Any]:
         maps = peel_mesh(geometry, search="linear")
         times = timed_in_turn({"peel": functools.partial(peel_mesh, geometry, search="linear")}, rounds)
         table_1[model] = {
-            "paper": {"triangles": triangles, "layers": layers, "milliseconds": milliseconds},
+            "paper": {"model": model, "triangles": triangles, "layers": layers, "milliseconds": milliseconds},
             "ours": {
                 "model": name,
                 "triangles": len(mesh.faces),
@@ -80,7 +80,7 @@ def paper_tables(quick: bool, rounds: int) -> dict[str, Any]:
                 "milliseconds": times["peel"]["median"],
             },
         }
-    table_2: dict[str, Any] = {}
+    table_2: dict[str, PaperScene] = {}
     for name, (reflector, reflection) in PAPER_TABLE_2.items():
         try:
             scene = ldtrefl.load_scene(ROOT / "scenes" / "paper" / f"{name}.toml")

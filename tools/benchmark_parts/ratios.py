@@ -1,25 +1,61 @@
-"""What the tables come to: medians over kinds of rays of one time over another."""
+"""Ratios of times: one tracer over another, many threads over one, with an outlier over without."""
 
 from __future__ import annotations
 
 import statistics
-from typing import Any
+from typing import TypedDict
 
 from .models import OUTLIER
+from .result import KindRow, RaysRow
 
 SMALLER, LARGER = "knot 96 k", "knot 2 M"
-"""The two whose times are compared."""
+"""The two knots whose times are compared."""
 
-Row = dict[str, Any]
+FORMS = ("numpy", "kernel")
+"""Forms of call: see ``result.Times``."""
+
+ByTracer = dict[str, dict[str, dict[str, float]]]
+"""Ratios by form of call, tracer and kind of rays."""
 
 
-def time_of(entry: dict[str, Any], form: str, tracer: str, threads: str) -> float | None:
+class Ratios(TypedDict):
+    """A rival's time over ours, over all kinds of rays; None where no kind was measured."""
+
+    closest: float | None
+    """The median over kinds of closest hits."""
+    least: float | None
+    """The least of those."""
+    any_hit: float | None
+    """The least over kinds of any-hit rays."""
+
+
+class RivalRow(TypedDict):
+    """Rivals on one mesh by one form of call."""
+
+    mesh: str
+    triangles: int
+    form: str
+    over: dict[str, Ratios]
+    """By rival."""
+
+
+class OutlierRow(TypedDict):
+    """A tracer's time on a mesh with an outlier over its time without, over kinds of rays."""
+
+    mesh: str
+    form: str
+    tracer: str
+    median: float
+    worst: float
+
+
+def time_of(entry: KindRow, form: str, tracer: str, threads: str) -> float | None:
     """Median milliseconds of a kind of rays, None where it was not measured."""
     found = entry["milliseconds"].get(threads, {}).get(form, {}).get(tracer)
     return None if found is None else found["median"]
 
 
-def over_kinds(row: Row, form: str, tracer: str, threads: str, *, any_hit: bool) -> list[float]:
+def over_kinds(row: RaysRow, form: str, tracer: str, threads: str, *, any_hit: bool) -> list[float]:
     """The tracer's time over ours, a figure per kind of rays."""
     ratios = []
     for entry in row["kinds"].values():
@@ -31,12 +67,12 @@ def over_kinds(row: Row, form: str, tracer: str, threads: str, *, any_hit: bool)
     return ratios
 
 
-def rival_over_ours(rows: list[Row], rivals: list[str], threads: str) -> list[Row]:
+def rival_over_ours(rows: list[RaysRow], rivals: list[str], threads: str) -> list[RivalRow]:
     """Per mesh, form of call and rival: median and least over kinds of closest hits, and the least of any hit."""
     found = []
     for row in rows:
-        for form in ("numpy", "kernel"):
-            entry: Row = {"mesh": row["mesh"], "triangles": row["triangles"], "form": form, "over": {}}
+        for form in FORMS:
+            entry: RivalRow = {"mesh": row["mesh"], "triangles": row["triangles"], "form": form, "over": {}}
             for rival in rivals:
                 closest = over_kinds(row, form, rival, threads, any_hit=False)
                 any_hit = over_kinds(row, form, rival, threads, any_hit=True)
@@ -51,7 +87,7 @@ def rival_over_ours(rows: list[Row], rivals: list[str], threads: str) -> list[Ro
     return found
 
 
-def few_over_many(row: Row, form: str, threads: list[str]) -> dict[str, float]:
+def few_over_many(row: RaysRow, form: str, threads: list[str]) -> dict[str, float]:
     """Per tracer, its time with the fewest threads over that with the most, median over kinds."""
     ratios: dict[str, list[float]] = {}
     for entry in row["kinds"].values():
@@ -63,13 +99,13 @@ def few_over_many(row: Row, form: str, threads: list[str]) -> dict[str, float]:
     return {tracer: statistics.median(values) for tracer, values in ratios.items()}
 
 
-def larger_over_smaller(rows: list[Row], tracers: list[str], threads: str) -> Row:
+def larger_over_smaller(rows: list[RaysRow], tracers: list[str], threads: str) -> ByTracer:
     """Per form, tracer and kind: time on the larger knot over time on the smaller, for as many rays."""
     by_name = {row["mesh"]: row["kinds"] for row in rows}
-    found: Row = {}
+    found: ByTracer = {}
     if SMALLER not in by_name or LARGER not in by_name:
         return found
-    for form in ("numpy", "kernel"):
+    for form in FORMS:
         for tracer in tracers:
             ratios = {}
             for kind, larger in by_name[LARGER].items():
@@ -82,7 +118,7 @@ def larger_over_smaller(rows: list[Row], tracers: list[str], threads: str) -> Ro
     return found
 
 
-def with_outlier_over_without(rows: list[Row], tracers: list[str], threads: str) -> list[Row]:
+def with_outlier_over_without(rows: list[RaysRow], tracers: list[str], threads: str) -> list[OutlierRow]:
     """Per mesh with an outlier, form and tracer: the median and the worst over kinds of its time over that without."""
     by_name = {row["mesh"]: row["kinds"] for row in rows}
     found = []
@@ -90,7 +126,7 @@ def with_outlier_over_without(rows: list[Row], tracers: list[str], threads: str)
         parts = OUTLIER.fullmatch(name)
         if parts is None or parts["base"] not in by_name:
             continue
-        for form in ("numpy", "kernel"):
+        for form in FORMS:
             for tracer in tracers:
                 ratios = []
                 for kind, entry in kinds.items():
@@ -99,17 +135,17 @@ def with_outlier_over_without(rows: list[Row], tracers: list[str], threads: str)
                     if base and pair[0] and pair[1]:
                         ratios.append((pair[0] / entry["rays"]) / (pair[1] / base["rays"]))
                 if ratios:
-                    summary = {"median": statistics.median(ratios), "worst": max(ratios)}
-                    found.append({"mesh": name, "form": form, "tracer": tracer, **summary})
+                    median, worst = statistics.median(ratios), max(ratios)
+                    found.append(OutlierRow(mesh=name, form=form, tracer=tracer, median=median, worst=worst))
     return found
 
 
-def slower_than_bvh(rows: list[Row], threads: list[str]) -> list[str]:
+def slower_than_bvh(rows: list[RaysRow], threads: list[str]) -> list[str]:
     """Where our BVH is faster than the maps: mesh, kind, form, threads and by how much."""
     found = []
     for row in rows:
         for kind, entry in row["kinds"].items():
-            for form in ("numpy", "kernel"):
+            for form in FORMS:
                 for count in threads:
                     ours, bvh = time_of(entry, form, "ldt", count), time_of(entry, form, "bvh", count)
                     if ours and bvh and ours > bvh:

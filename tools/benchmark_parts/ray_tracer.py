@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -13,19 +13,20 @@ from .rays import Rays
 class RayTracer:
     """A scene of one mesh, ready for its first ray when made.
 
-    ``closest`` and ``occluded`` take and give numpy arrays: of closest hits all that is told. ``prepared`` gives a call
-    that traces rays which lie where the tracer wants them, and asks for the least that it can be asked for.
+    ``closest`` and ``occluded`` take and give numpy arrays; ``closest`` gives everything that the tracer tells of a
+    hit. ``prepared`` puts the rays where the tracer wants them, and gives a call that traces them and asks for as
+    little as the tracer can be asked for.
     """
 
     name: ClassVar[str]
     is_default: ClassVar[bool] = True
-    """Whether it is what its users get without options: then its public calls are timed, too."""
+    """Whether its users get it so without options: then its public calls are timed, too."""
     has_threads: ClassVar[bool] = True
     """Whether tracing uses more than one."""
     builds_on_all: ClassVar[bool] = False
     """Whether building uses all cores, whatever ``set_threads`` says."""
     most_triangles: ClassVar[int] = 1 << 30
-    """Left out above: memory for so many trees at a time."""
+    """Meshes of more are left out: so many trees at a time would not fit into memory."""
 
     def __init__(self, vertices: np.ndarray, faces: np.ndarray) -> None:
         """Build for (n, 3) float32 vertices and (m, 3) int32 faces."""
@@ -43,7 +44,7 @@ class RayTracer:
         """Whether it has a call for them that takes and gives numpy arrays."""
         return self.takes(rays)
 
-    def closest(self, rays: Rays) -> Any:
+    def closest(self, rays: Rays) -> object:
         """All that it tells of closest hits, as numpy arrays."""
         raise NotImplementedError
 
@@ -55,6 +56,6 @@ class RayTracer:
         """(n,) bool, by any-hit queries."""
         raise NotImplementedError
 
-    def prepared(self, rays: Rays) -> Callable[[], Any]:
+    def prepared(self, rays: Rays) -> Callable[[], object]:
         """A call that traces these rays for the least answer."""
         raise NotImplementedError

@@ -3,22 +3,28 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import cast
 
 import matplotlib
 import numpy as np
+from timing import Summary
 
 from ldtrefl.files.whole import written_whole
 
 from .models import KNOTS
+from .result import ErrorPoint, Result
 from .tables import build_tables, memory_table, number, rays_tables, table
 from .tracing import OLD_KIND
 
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt
+from matplotlib.figure import Figure
+
+LEAST_ERROR = 1e-7
+"""What an error of 0 is drawn as, for the axis is logarithmic."""
 
 
-def draw_plots(result: dict[str, Any], folder: Path) -> None:
+def draw_plots(result: Result, folder: Path) -> None:
     """Error against time, and time, build time and bytes against triangles, of the parts that were run."""
     threads = str(result["threads"][0])
     if "error_against_time" in result:
@@ -39,18 +45,18 @@ def draw_plots(result: dict[str, Any], folder: Path) -> None:
         _plot_against_triangles(megabytes, "megabytes beside the mesh", folder / "bytes_against_triangles.png")
 
 
-def _medians(times: dict[int, dict[str, Any]]) -> dict[int, dict[str, float]]:
+def _medians(times: dict[int, dict[str, Summary]]) -> dict[int, dict[str, float]]:
     return {n: {name: entry["median"] for name, entry in by_tracer.items()} for n, by_tracer in times.items()}
 
 
-def _plot_error_against_time(points: list[dict[str, Any]], folder: Path) -> None:
+def _plot_error_against_time(points: list[ErrorPoint], folder: Path) -> None:
     figure, axes = plt.subplots(figsize=(7, 5))
     curves: dict[str, list[tuple[float, float]]] = {}
     for point in points:
         curves.setdefault(point["curve"], []).append((point["milliseconds"]["median"], point["flip"]))
     for curve, pairs in curves.items():
         times, errors = zip(*pairs, strict=True)
-        axes.plot(times, np.maximum(errors, 1e-7), "o-", label=curve, markersize=4)
+        axes.plot(times, np.maximum(errors, LEAST_ERROR), "o-", label=curve, markersize=4)
     axes.set(xscale="log", yscale="log", xlabel="milliseconds per frame", ylabel="FLIP over the mirror (1e-7 = none)")
     axes.set_title("Error against time: mirror ball and torus knot")
     axes.grid(True, which="both", alpha=0.3)
@@ -71,22 +77,26 @@ def _plot_against_triangles(values: dict[int, dict[str, float]], label: str, pat
     _save(figure, path)
 
 
-def _save(figure: Any, path: Path) -> None:
+def _save(figure: Figure, path: Path) -> None:
     figure.tight_layout()
     with written_whole(path) as scratch:
         figure.savefig(scratch, dpi=110)
     plt.close(figure)
 
 
-def of_fastest(result: Any) -> Any:
+def of_fastest(result: Result) -> Result:
     """The same figures with the fastest round of each timing in the place of the median."""
-    if isinstance(result, dict):
-        replaced = {"median": result["min"]} if {"median", "min"} <= set(result) else {}
-        return {key: of_fastest(value) for key, value in result.items()} | replaced
-    return [of_fastest(value) for value in result] if isinstance(result, list) else result
+    return cast(Result, _of_fastest(result))
 
 
-def reading(result: dict[str, Any]) -> str:
+def _of_fastest(value: object) -> object:
+    if isinstance(value, dict):
+        replaced = {"median": value["min"]} if {"median", "min"} <= set(value) else {}
+        return {key: _of_fastest(entry) for key, entry in value.items()} | replaced
+    return [_of_fastest(entry) for entry in value] if isinstance(value, list) else value
+
+
+def reading(result: Result) -> str:
     """The figures of the parts that were run, as Markdown tables."""
     lines = ["# Benchmark", "", f"{result['machine']}; {result['statistic']} of things timed in turn.", ""]
     if result["notes"]:
@@ -104,7 +114,7 @@ def reading(result: dict[str, Any]) -> str:
     return "\n".join(lines).rstrip() + "\n"
 
 
-def _frame_tables(result: dict[str, Any]) -> list[str]:
+def _frame_tables(result: Result) -> list[str]:
     lines = ["## A frame, by stage", ""]
     for name, stages in result["stages"].items():
         lines.append(f"- {name}: " + ", ".join(f"{stage} {value:.1f}" for stage, value in stages.items()))
@@ -123,12 +133,12 @@ def _frame_tables(result: dict[str, Any]) -> list[str]:
     return lines + table(["method", "parameter", "ms", "SSIM", "FLIP"], body)
 
 
-def _scaling_line(result: dict[str, Any]) -> list[str]:
+def _scaling_line(result: Result) -> list[str]:
     scaling = ", ".join(f"{name} {value:.2f}" for name, value in result["scaling"].items())
     return [f"One thread over two: {scaling}.", ""]
 
 
-def _paper_tables(result: dict[str, Any]) -> list[str]:
+def _paper_tables(result: Result) -> list[str]:
     body = []
     for model, entry in result["paper"]["table_1"].items():
         paper, ours = entry["paper"], entry["ours"]
@@ -138,8 +148,7 @@ def _paper_tables(result: dict[str, Any]) -> list[str]:
     lines = ["## The paper's tables", ""]
     lines += table(["model", "paper: layers, ms (GeForce 7800)", "ours", "layers, ms (this CPU)"], body)
     body = []
-    for name, entry in result["paper"]["table_2"].items():
-        paper, ours = entry["paper"], entry["ours"]
-        total = paper["reflector"] + paper["reflection"]
-        body.append([name, f"{total:.1f}", f"{ours['linear']:.1f}", f"{ours['exact']:.1f}"])
+    for name, scene in result["paper"]["table_2"].items():
+        total, by_search = sum(scene["paper"].values()), scene["ours"]
+        body.append([name, f"{total:.1f}", f"{by_search['linear']:.1f}", f"{by_search['exact']:.1f}"])
     return lines + table(["scene", "paper: reflector + reflection ms", "ours: linear", "exact"], body)

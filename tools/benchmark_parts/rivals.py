@@ -26,7 +26,7 @@ SMALLEST_SCENE = np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.int32)
 
 
 class Rival(RayTracer):
-    """Somebody else's."""
+    """A ray tracer of another library."""
 
     @classmethod
     def load(cls) -> None:
@@ -60,7 +60,7 @@ class Embreex(Rival):
     def occluded(self, rays: Rays) -> np.ndarray:
         return self._built.run(rays.origins, rays.directions, query="OCCLUDED") >= 0
 
-    def prepared(self, rays: Rays) -> Callable[[], Any]:
+    def prepared(self, rays: Rays) -> Callable[[], object]:
         query = "OCCLUDED" if rays.any_hit else "INTERSECT"
         return lambda: self._built.run(rays.origins, rays.directions, query=query)
 
@@ -99,7 +99,7 @@ class Open3d(Rival):
     def occluded(self, rays: Rays) -> np.ndarray:
         return self._built.test_occlusions(self._rays(rays), nthreads=self._threads).numpy()
 
-    def prepared(self, rays: Rays) -> Callable[[], Any]:
+    def prepared(self, rays: Rays) -> Callable[[], object]:
         ready = self._rays(rays)
         if rays.any_hit:
             return lambda: self._built.test_occlusions(ready, nthreads=self._threads)
@@ -161,7 +161,7 @@ class MitsubaLlvm(Rival):
     def occluded(self, rays: Rays) -> np.ndarray:
         return self._built.ray_test(self._rays(rays), coherent=False).numpy()
 
-    def prepared(self, rays: Rays) -> Callable[[], Any]:
+    def prepared(self, rays: Rays) -> Callable[[], object]:
         ready = self._rays(rays)
 
         def trace() -> None:
@@ -209,7 +209,7 @@ class MitsubaScalar(MitsubaLlvm):
     def takes_arrays(self, rays: Rays) -> bool:
         return False
 
-    def prepared(self, rays: Rays) -> Callable[[], Any]:
+    def prepared(self, rays: Rays) -> Callable[[], object]:
         self._mi.set_variant(self.variant)
         assert rays.size is not None
         columns, rows = rays.size

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
+
+from timing import Summary
 
 from .ratios import (
-    Row,
     few_over_many,
     larger_over_smaller,
     rival_over_ours,
@@ -13,6 +14,7 @@ from .ratios import (
     time_of,
     with_outlier_over_without,
 )
+from .result import RaysRow, Result
 from .tracing import OLD_KIND
 
 FORMS = {"numpy": "public calls, numpy in and numpy out", "kernel": "kernels alone"}
@@ -28,7 +30,7 @@ def number(value: float | None, digits: int = 2) -> str:
     return "-" if value is None else f"{value:.{digits}f}"
 
 
-def rays_tables(result: dict[str, Any]) -> list[str]:
+def rays_tables(result: Result) -> list[str]:
     """Summary, rates and errors."""
     rows, threads = result["rays"], [str(count) for count in result["threads"]]
     others = [name for name in result["tracers"] if not name.startswith("ldt")]
@@ -50,7 +52,7 @@ def rays_tables(result: dict[str, Any]) -> list[str]:
     return [*lines, "## Errors", "", *_error_table(rows), *_old_table(rows, threads[0])]
 
 
-def _ratio_table(rows: list[Row], others: list[str], threads: str) -> list[str]:
+def _ratio_table(rows: list[RaysRow], others: list[str], threads: str) -> list[str]:
     entries = rival_over_ours(rows, others, threads)
     shown = [other for other in others if any(other in entry["over"] for entry in entries)]
     body = []
@@ -66,7 +68,7 @@ def _ratio_table(rows: list[Row], others: list[str], threads: str) -> list[str]:
     return table(["mesh", "triangles", "calls", *shown], body)
 
 
-def _scaling_table(rows: list[Row], tracers: list[str], threads: list[str]) -> list[str]:
+def _scaling_table(rows: list[RaysRow], tracers: list[str], threads: list[str]) -> list[str]:
     if len(threads) == 1:
         return []
     measured = [(row["mesh"], form, few_over_many(row, form, threads)) for row in rows for form in FORMS]
@@ -76,7 +78,7 @@ def _scaling_table(rows: list[Row], tracers: list[str], threads: list[str]) -> l
     return lines + table(["mesh", "calls", *shown], body)
 
 
-def _larger_and_outliers(rows: list[Row], tracers: list[str], threads: str) -> list[str]:
+def _larger_and_outliers(rows: list[RaysRow], tracers: list[str], threads: str) -> list[str]:
     lines = []
     larger = larger_over_smaller(rows, tracers, threads)
     if larger:
@@ -103,7 +105,7 @@ def _larger_and_outliers(rows: list[Row], tracers: list[str], threads: str) -> l
     return lines
 
 
-def _rate_table(rows: list[Row], form: str, threads: str, tracers: list[str]) -> list[str]:
+def _rate_table(rows: list[RaysRow], form: str, threads: str, tracers: list[str]) -> list[str]:
     body = []
     shown = [t for t in tracers if any(time_of(e, form, t, threads) for row in rows for e in row["kinds"].values())]
     for row in rows:
@@ -117,7 +119,7 @@ def _rate_table(rows: list[Row], form: str, threads: str, tracers: list[str]) ->
     return table(["mesh", "rays", "number", "hits, %", *shown], body)
 
 
-def _error_table(rows: list[Row]) -> list[str]:
+def _error_table(rows: list[RaysRow]) -> list[str]:
     lines = [
         "Wrong hits and misses in percent of true hits, distances in texels of a 128 map, same triangle in percent of"
     ]
@@ -134,13 +136,14 @@ def _error_table(rows: list[Row]) -> list[str]:
                 cells.append("-" if wrong is None else f"{wrong['wrong_hits']:.4f}, {wrong['wrong_misses']:.4f}")
             for tracer in ("ldt exact", "ldt"):
                 wrong = entry["errors"].get(tracer, {})
-                cells.append(", ".join(number(wrong.get(key), 3) for key in ("p99", "p999", "same_triangle")))
+                figures = wrong.get("p99"), wrong.get("p999"), wrong.get("same_triangle")
+                cells.append(", ".join(number(figure, 3) for figure in figures))
             body.append(cells)
     columns = ["mesh", "rays", "undecided", "bvh: wrong hits, misses", "embreex", "ldt exact", "ldt"]
     return lines + table([*columns, "ldt exact: p99, p99.9, same", "ldt: p99, p99.9, same"], body)
 
 
-def _old_table(rows: list[Row], threads: str) -> list[str]:
+def _old_table(rows: list[RaysRow], threads: str) -> list[str]:
     """Milliseconds of the rays that a frame's mirror ball sends, in the order of earlier reports."""
     tracers = ["bvh", "embreex", "ldt exact", "ldt", "ldt fast", "ldt linear"]
     body = []
@@ -166,7 +169,7 @@ def _old_table(rows: list[Row], threads: str) -> list[str]:
     ]
 
 
-def build_tables(result: dict[str, Any]) -> list[str]:
+def build_tables(result: Result) -> list[str]:
     """Milliseconds to build, and bytes."""
     rows = result["build"]
     lines = []
@@ -194,12 +197,12 @@ def build_tables(result: dict[str, Any]) -> list[str]:
     return lines + table(["mesh", *names], body)
 
 
-def _quotient(above: dict[str, Any], upper: str, below: dict[str, Any], lower: str) -> float | None:
+def _quotient(above: Mapping[str, Summary], upper: str, below: Mapping[str, Summary], lower: str) -> float | None:
     """One median over another, where both are known."""
     return above[upper]["median"] / below[lower]["median"] if upper in above and lower in below else None
 
 
-def memory_table(result: dict[str, Any]) -> list[str]:
+def memory_table(result: Result) -> list[str]:
     """Megabytes, and times the mesh's own bytes."""
     body = []
     for row in result["memory"]:

@@ -5,22 +5,22 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
-from timing import timed_in_turn
+from timing import Summary, timed_in_turn
 
 from .cores import ALL
 from .models import Model
 from .ours import Caster, Exact, Fast, Linear, Ours, Peeled
 from .ray_tracer import RayTracer
 from .rays import RAYS, Rays, kinds_of
+from .result import KindRow, RaysRow, Times
 from .rivals import Embreex
 from .truth import errors_of, truth, wrong_answers
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What is wanted."""
+    """What of the rays is wanted."""
 
     threads: Sequence[int]
     rays: int = RAYS
@@ -40,7 +40,7 @@ MOST_SECONDS = 5.0
 Built = dict[str, RayTracer]
 
 
-def rays_on_mesh(mesh: Model, tracers: Sequence[type[RayTracer]], rounds: int, plan: Plan) -> dict[str, Any]:
+def rays_on_mesh(mesh: Model, tracers: Sequence[type[RayTracer]], rounds: int, plan: Plan) -> RaysRow:
     """Times and errors by kind of rays."""
     built = _built(mesh, tracers)
     judge = next(built[name] for name in JUDGES if name in built)
@@ -58,12 +58,12 @@ def _built(mesh: Model, tracers: Sequence[type[RayTracer]]) -> Built:
     return {tracer.name: tracer(mesh.vertices, mesh.faces) for tracer in some}
 
 
-def _measured(mesh: Model, batch: Rays, built: Built, rounds: int, plan: Plan) -> dict[str, Any]:
+def _measured(mesh: Model, batch: Rays, built: Built, rounds: int, plan: Plan) -> KindRow:
     """Times and errors of everybody who takes these rays."""
     taking = {name: tracer for name, tracer in built.items() if tracer.takes(batch)}
     if batch.kind != OLD_KIND:
         taking = {name: tracer for name, tracer in taking.items() if name not in (Fast.name, Linear.name)}
-    milliseconds = {}
+    milliseconds: Times = {}
     for count in plan.threads:
         for tracer in taking.values():
             tracer.set_threads(count)
@@ -88,9 +88,9 @@ def _measured(mesh: Model, batch: Rays, built: Built, rounds: int, plan: Plan) -
     }
 
 
-def _times(batch: Rays, taking: Built, count: int, rounds: int) -> dict[str, dict[str, Any]]:
+def _times(batch: Rays, taking: Built, count: int, rounds: int) -> dict[str, dict[str, Summary]]:
     """Milliseconds by form of call ("numpy" or "kernel") and tracer, all in turn."""
-    jobs: dict[tuple[str, str], Callable[[], Any]] = {}
+    jobs: dict[tuple[str, str], Callable[[], object]] = {}
     for name, tracer in taking.items():
         if count > 1 and (name in (Exact.name, Fast.name, Linear.name) or not tracer.has_threads):
             continue
@@ -98,13 +98,13 @@ def _times(batch: Rays, taking: Built, count: int, rounds: int) -> dict[str, dic
             jobs["numpy", name] = functools.partial(tracer.occluded if batch.any_hit else tracer.closest, batch)
         jobs["kernel", name] = tracer.prepared(batch)
     times = timed_in_turn({" ".join(key): job for key, job in jobs.items()}, rounds, MOST_SECONDS)
-    found: dict[str, dict[str, Any]] = {"numpy": {}, "kernel": {}}
+    found: dict[str, dict[str, Summary]] = {"numpy": {}, "kernel": {}}
     for form, name in jobs:
         found[form][name] = times[f"{form} {name}"]
     return found
 
 
-def rays_line(row: dict[str, Any]) -> str:
+def rays_line(row: RaysRow) -> str:
     """The mesh and million rays a second of ours and embreex's kernels, by kind."""
     parts = []
     for kind, entry in row["kinds"].items():

@@ -14,6 +14,7 @@ import numpy as np
 
 from .models import Model
 from .rays import Rays
+from .result import Errors
 
 EDGE = 2e-7
 """1e-7 of the mesh's longest side, which is 2."""
@@ -23,6 +24,9 @@ SAME = 1e-6
 
 FLOAT32 = 2.4e-7
 """Relative rounding of a float32 distance, four times: no error, and long where an outlier is met."""
+
+LEAST_LENGTH = 1e-300
+"""To divide by."""
 
 TEXELS = 128
 """Along the mesh's longest side: distances are given in them, whatever a map's resolution."""
@@ -79,12 +83,12 @@ def _meet(model: Model, rays: Rays, which: np.ndarray, triangle: np.ndarray) -> 
         sides = []
         for start, end in ((a, b), (b, c), (c, a)):
             volume = (d * np.cross(start, end)).sum(axis=1)
-            sides.append(volume / np.maximum(np.linalg.norm(np.cross(d, end - start), axis=1), 1e-300))
+            sides.append(volume / np.maximum(np.linalg.norm(np.cross(d, end - start), axis=1), LEAST_LENGTH))
     inside = np.stack(sides)
     return np.where(np.isfinite(t), t, np.inf), np.maximum(inside.min(axis=0), (-inside).min(axis=0))
 
 
-def errors_of(answer: Answer, right: Truth) -> dict[str, float]:
+def errors_of(answer: Answer, right: Truth) -> Errors:
     """Wrong hits and misses in percent of true hits, distances in texels, same triangle in percent of common hits."""
     t, triangle = answer
     hit, true_hit = (triangle >= 0) & right.sure, (right.triangle >= 0) & right.sure
@@ -92,15 +96,16 @@ def errors_of(answer: Answer, right: Truth) -> dict[str, float]:
     apart = np.maximum(np.abs(t[both].astype(float) - right.t[both]) - FLOAT32 * right.t[both], 0.0)
     p50, p99, p999 = np.percentile(apart * TEXELS / 2, [50, 99, 99.9]) if both.any() else (0.0, 0.0, 0.0)
     same = (triangle[both] == right.triangle[both]) | (apart <= SAME)
-    return wrong_answers(hit, true_hit) | {
+    of_hits: Errors = {
         "median": float(p50),
         "p99": float(p99),
         "p999": float(p999),
         "same_triangle": 100.0 * float(same.mean()) if both.any() else 100.0,
     }
+    return wrong_answers(hit, true_hit) | of_hits
 
 
-def wrong_answers(hit: np.ndarray, true_hit: np.ndarray) -> dict[str, float]:
+def wrong_answers(hit: np.ndarray, true_hit: np.ndarray) -> Errors:
     """Wrong hits and misses in percent of true hits."""
     hits = max(int(true_hit.sum()), 1)
     return {

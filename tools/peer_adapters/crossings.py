@@ -1,6 +1,6 @@
-"""All crossings of a ray with a mesh, by a tracer that answers first hits: it goes on from each as rays leave surfaces.
+"""All crossings of a ray with a mesh, by a tracer that finds first hits: from each hit the ray is traced on.
 
-Other libraries' rays are float64 and ours float32, so the mesh is traced about the middle of its box.
+Rays of other libraries are float64 and ours are float32, so the mesh is moved to have the middle of its box at 0.
 """
 
 from __future__ import annotations
@@ -8,7 +8,6 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -16,7 +15,7 @@ import ldtrefl
 from ldtrefl.world.unit_rays import LEAVING
 
 AT_ONCE = 1_000_000
-"""Rays traced together: some hundred MB."""
+"""Rays traced at once, which takes some hundred megabytes."""
 
 MOST = 1000
 """Crossings of a ray after which it is given up."""
@@ -24,13 +23,15 @@ MOST = 1000
 SAME_PLACE = 8.0
 """Times ``LEAVING``, how far apart along the ray two crossings of one edge may be found."""
 
+LEAST_LENGTH = 1e-300
+"""To divide by: triangles without area have no normal."""
 
-TRACERS: dict[str, Callable[[np.ndarray, np.ndarray], Any]] = {
+TRACERS: dict[str, Callable[[np.ndarray, np.ndarray], ldtrefl.LayeredDepthTexture | ldtrefl.Raycaster]] = {
     "exact": functools.partial(ldtrefl.peel, quality="exact"),
     "balanced": ldtrefl.peel,
     "bvh": ldtrefl.Raycaster,
 }
-"""By name what makes a tracer of vertices and faces."""
+"""What makes a tracer of vertices and faces, by name."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,10 @@ class Target:
         self.tracer = TRACERS[by](self.mesh.vertices, self.mesh.faces)
         a, b, c = np.moveaxis(self.mesh.vertices[self.mesh.faces], 1, 0)
         normals = np.cross(b - a, c - a)
-        self._corner, self._normals = a, normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+        self._corner, self._normals = (
+            a,
+            normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), LEAST_LENGTH),
+        )
         self._lift = float(LEAVING) * self.mesh.unit_frame[1]
 
     def first(self, origins: np.ndarray, directions: np.ndarray) -> ldtrefl.Hits:

@@ -12,22 +12,23 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike, DTypeLike
 
 from ldtrefl.scene import shapes
 
 from .crossings import Crossings, Target
 
 INVALID_ID = 2**32 - 1
-"""Of the geometry and the triangle of a miss."""
+"""Number of the geometry and of the triangle that a miss is given."""
 
 TILTS = ((0.43, 0.61, 0.65), (-0.71, 0.13, 0.69), (0.17, -0.83, 0.52))
-"""Ways along which crossings are counted to tell inside from outside."""
+"""Directions of the rays whose crossings are counted to tell inside from outside."""
 
 
 class Tensor(np.ndarray):
     """A NumPy array with the few methods of Open3D's tensors that its tests use."""
 
-    def __new__(cls, values: Any, dtype: Any = None, device: Any = None) -> Tensor:
+    def __new__(cls, values: ArrayLike, dtype: DTypeLike | None = None, device: object = None) -> Tensor:
         """An array of a copy of the values."""
         return np.array(values, dtype).view(cls)
 
@@ -36,12 +37,12 @@ class Tensor(np.ndarray):
         """The array seen as a tensor."""
         return cast(Tensor, array.view(Tensor))
 
-    def __getitem__(self, key: Any) -> Any:
-        """A tensor, of one number too."""
+    def __getitem__(self, key: Any) -> Tensor:
+        """A tensor, even of one number."""
         return np.asarray(np.asarray(self)[key]).view(Tensor)
 
-    def to(self, target: Any) -> Tensor:
-        """Another kind of number, or the same on a device."""
+    def to(self, target: str | type) -> Tensor:
+        """A copy of another type, or the same tensor where a device is named."""
         return self if isinstance(target, str) else Tensor(self, target)
 
     def cpu(self) -> Tensor:
@@ -63,7 +64,7 @@ def _mesh(vertices: np.ndarray, faces: np.ndarray) -> SimpleNamespace:
 
 
 class TriangleMesh:
-    """The two shapes that the tests make."""
+    """The two shapes that the tests create."""
 
     @staticmethod
     def create_box() -> SimpleNamespace:
@@ -79,21 +80,23 @@ class TriangleMesh:
 
 
 class RaycastingScene:
-    """What the tests ask; subclasses name the tracer."""
+    """The part of Open3D's class that its tests use; subclasses name the tracer."""
 
     by = "exact"
     INVALID_ID = INVALID_ID
 
-    def __init__(self, nthreads: int = 0, device: Any = None) -> None:
+    def __init__(self, nthreads: int = 0, device: object = None) -> None:
         self._vertices: list[np.ndarray] = []
         self._faces: list[np.ndarray] = []
         self._target: Target | None = None
 
-    def add_triangles(self, mesh_or_vertices: Any, triangles: Any = None) -> int:
-        """Add a mesh, or vertices (n, 3) and triangles (m, 3); its number."""
-        if triangles is None:
-            mesh_or_vertices, triangles = mesh_or_vertices.vertex.positions, mesh_or_vertices.triangle.indices
-        self._vertices.append(np.asarray(mesh_or_vertices, float))
+    def add_triangles(self, mesh_or_vertices: SimpleNamespace | np.ndarray, triangles: ArrayLike | None = None) -> int:
+        """Add a mesh, or (n, 3) vertices and (m, 3) triangles; returns the number of the geometry."""
+        if isinstance(mesh_or_vertices, SimpleNamespace):
+            vertices, triangles = mesh_or_vertices.vertex.positions, mesh_or_vertices.triangle.indices
+        else:
+            vertices = mesh_or_vertices
+        self._vertices.append(np.asarray(vertices, float))
         self._faces.append(np.asarray(triangles, int))
         self._target = None
         return len(self._faces) - 1
@@ -113,7 +116,7 @@ class RaycastingScene:
         numbers = (np.where(missed, INVALID_ID, geometry), np.where(missed, INVALID_ID, triangle - firsts[geometry]))
         return Tensor(numbers[0], np.uint32), Tensor(numbers[1], np.uint32)
 
-    def cast_rays(self, rays: Any, nthreads: int = 0) -> dict[str, Tensor]:
+    def cast_rays(self, rays: np.ndarray, nthreads: int = 0) -> dict[str, Tensor]:
         """First hits of (..., 6) rays."""
         shape = rays.shape[:-1]
         hits = self._built().first(*_split(rays))
@@ -122,18 +125,18 @@ class RaycastingScene:
         found |= {"primitive_uvs": hits.barycentrics, "primitive_normals": hits.normal}
         return {name: Tensor(np.reshape(array, shape + array.shape[1:])) for name, array in found.items()}
 
-    def test_occlusions(self, rays: Any, tnear: float = 0.0, tfar: float = np.inf, nthreads: int = 0) -> Tensor:
+    def test_occlusions(self, rays: np.ndarray, tnear: float = 0.0, tfar: float = np.inf, nthreads: int = 0) -> Tensor:
         """(...) bool: whether something is met from ``tnear`` to ``tfar``."""
         origins, directions = _split(rays)
         blocked = self._built().occluded(origins + tnear * directions, directions, tfar - tnear)
         return Tensor(blocked.reshape(rays.shape[:-1]))
 
-    def count_intersections(self, rays: Any, nthreads: int = 0) -> Tensor:
+    def count_intersections(self, rays: np.ndarray, nthreads: int = 0) -> Tensor:
         """(...) crossings of each ray."""
         found = self._built().crossings(*_split(rays))
         return Tensor(np.bincount(found.ray, minlength=rays.size // 6).reshape(rays.shape[:-1]))
 
-    def list_intersections(self, rays: Any, nthreads: int = 0) -> dict[str, Tensor]:
+    def list_intersections(self, rays: np.ndarray, nthreads: int = 0) -> dict[str, Tensor]:
         """Every crossing, and where those of each ray begin."""
         found: Crossings = self._built().crossings(*_split(rays))
         geometry, triangle = self._named(found.triangle)
@@ -142,7 +145,7 @@ class RaycastingScene:
         arrays |= {"geometry_ids": geometry, "primitive_ids": triangle, "primitive_uvs": found.barycentrics}
         return {name: Tensor(array) for name, array in arrays.items()}
 
-    def compute_occupancy(self, points: Any, nthreads: int = 0, nsamples: int = 1) -> Tensor:
+    def compute_occupancy(self, points: np.ndarray, nthreads: int = 0, nsamples: int = 1) -> Tensor:
         """(...) 1 inside and 0 outside (..., 3): most of ``nsamples`` rays cross the surface an odd number of times."""
         votes = np.zeros(points.shape[:-1])
         for tilt in TILTS[:nsamples]:
@@ -150,14 +153,14 @@ class RaycastingScene:
             votes += np.asarray(self.count_intersections(rays)) % 2
         return Tensor(votes > nsamples / 2, np.float32)
 
-    def compute_closest_points(self, *arguments: Any, **options: Any) -> None:
-        """No ray query."""
+    def compute_closest_points(self, *arguments: object, **options: object) -> None:
+        """Skips the test: this is no ray query."""
         pytest.skip("a query of the closest point is no ray query")
 
     compute_distance = compute_signed_distance = compute_closest_points
 
 
-def _split(rays: Any) -> tuple[np.ndarray, np.ndarray]:
+def _split(rays: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     flat = np.asarray(rays, float).reshape(-1, 6)
     return flat[:, :3], flat[:, 3:]
 

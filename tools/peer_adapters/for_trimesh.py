@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import trimesh
+from numpy.typing import ArrayLike
 from trimesh.ray.ray_util import contains_points
 
 from .crossings import Crossings, Target
 
 
 class RayMeshIntersector:
-    """What trimesh's tests ask of ``mesh.ray``; subclasses name the tracer."""
+    """The part of ``mesh.ray`` that trimesh's tests use; subclasses name the tracer."""
 
     by = "exact"
 
@@ -29,13 +28,13 @@ class RayMeshIntersector:
 
     def intersects_id(
         self,
-        ray_origins: Any,
-        ray_directions: Any,
+        ray_origins: ArrayLike,
+        ray_directions: ArrayLike,
         multiple_hits: bool = True,
         max_hits: int | None = None,
         return_locations: bool = False,
     ) -> tuple[np.ndarray, ...]:
-        """Triangles and rays of all crossings, or of the first; with ``return_locations`` the points, too."""
+        """(k,) triangles and rays of all crossings, or of each ray's first; with ``return_locations`` points, too."""
         origins, directions = _rays(ray_origins, ray_directions)
         target = self._target()
         if multiple_hits:
@@ -50,26 +49,30 @@ class RayMeshIntersector:
         return found.triangle, found.ray, target.on_plane(found.triangle, points)
 
     def intersects_location(
-        self, ray_origins: Any, ray_directions: Any, **options: Any
+        self,
+        ray_origins: ArrayLike,
+        ray_directions: ArrayLike,
+        multiple_hits: bool = True,
+        max_hits: int | None = None,
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Points, rays and triangles of crossings."""
-        triangle, ray, points = self.intersects_id(ray_origins, ray_directions, return_locations=True, **options)
+        """(k, 3) points, (k,) rays and triangles of crossings."""
+        triangle, ray, points = self.intersects_id(ray_origins, ray_directions, multiple_hits, max_hits, True)
         return points, ray, triangle
 
-    def intersects_first(self, ray_origins: Any, ray_directions: Any) -> np.ndarray:
-        """(n,) first triangles, -1 on a miss."""
+    def intersects_first(self, ray_origins: ArrayLike, ray_directions: ArrayLike) -> np.ndarray:
+        """(n,) the triangle that each ray meets first, -1 on a miss."""
         return self._target().first(*_rays(ray_origins, ray_directions)).triangle
 
-    def intersects_any(self, ray_origins: Any, ray_directions: Any) -> np.ndarray:
-        """(n,) bool."""
+    def intersects_any(self, ray_origins: ArrayLike, ray_directions: ArrayLike) -> np.ndarray:
+        """(n,) bool: whether each ray meets anything."""
         return self._target().occluded(*_rays(ray_origins, ray_directions), np.inf)
 
-    def contains_points(self, points: Any) -> np.ndarray:
-        """(n,) bool, by trimesh's own rule."""
+    def contains_points(self, points: ArrayLike) -> np.ndarray:
+        """(n,) bool: whether points lie inside, by trimesh's own rule."""
         return contains_points(self, points)
 
 
-def _rays(origins: Any, directions: Any) -> tuple[np.ndarray, np.ndarray]:
+def _rays(origins: ArrayLike, directions: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
     return np.asarray(origins, float), np.asarray(directions, float)
 
 
