@@ -105,8 +105,6 @@ STILL_TO_MEND: dict[str, dict[str, list[str]]] = {
         ],
         "ldtrefl/world/device_scene.py": ["DeviceObject(record)"],
         "tools/ablation.py": ["table(result)"],
-        "tools/stress_cases/bounds.py": ["variants(params)"],
-        "tools/stress_cases/cache_files.py": ["spoiled_fields(values)"],
     },
     "kernels say what one thread does": {
         "ldtrefl/device/bins.py": ["copy_lists", "count_items"],

@@ -13,13 +13,13 @@ import os
 
 import numpy as np
 import warp as wp
+from stress_cases.inputs import camera_rays
 from timing import timed_in_turn
 
 from ldtrefl.device import launch
 from ldtrefl.frame.gbuffer import draw_gbuffer
 from ldtrefl.scene.description import Camera, Object, Scene
 from ldtrefl.tracing.bvh import Raycaster
-from ldtrefl.world.camera import camera_axes
 from ldtrefl.world.device_scene import DeviceScene
 
 ROUNDS, QUICK_ROUNDS = 9, 2
@@ -27,15 +27,10 @@ KNOTS = {"10 k": (200, 25), "96 k": (600, 80), "500 k": (2000, 125), "2 M": (500
 """Segments of the knot, by its number of triangles."""
 
 
-def camera_rays(camera: Camera) -> tuple[wp.array, wp.array]:
-    """(width * height,) origins and directions of the rays through the centres of all pixels, row by row."""
-    right, down, forward = camera_axes(camera)
-    half = np.tan(np.radians(camera.fov_y / 2))
-    x, y = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
-    across = (2 * x / camera.width - 1) * half * camera.width / camera.height
-    rays = forward + across[..., None] * right + ((2 * y / camera.height - 1) * half)[..., None] * down
-    origins = np.broadcast_to(camera.eye, (x.size, 3)).astype(np.float32)
-    return wp.array(origins, dtype=wp.vec3), wp.array(rays.reshape(-1, 3).astype(np.float32), dtype=wp.vec3)
+def rays_on_device(camera: Camera) -> tuple[wp.array, wp.array]:
+    """(width * height,) origins and directions of the rays through the centres of all pixels, on the device."""
+    origins, directions = (rays.astype(np.float32) for rays in camera_rays(camera))
+    return wp.array(origins, dtype=wp.vec3), wp.array(directions, dtype=wp.vec3)
 
 
 def line_of(name: str, camera: Camera, device: wp.Device, rounds: int) -> str:
@@ -43,7 +38,7 @@ def line_of(name: str, camera: Camera, device: wp.Device, rounds: int) -> str:
     ball = Object(shape="sphere")
     knot = Object(shape="torus_knot", params={"segments": list(KNOTS[name])}, scale=0.7, translate=(-1.1, -1.4, 0))
     scene = DeviceScene(Scene(camera=camera, objects=(ball, knot)), device)
-    origins, directions = camera_rays(camera)
+    origins, directions = rays_on_device(camera)
     casters = [Raycaster.of(entry.geometry) for entry in scene.objects]
 
     def draw() -> None:

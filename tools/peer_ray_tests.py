@@ -1,6 +1,6 @@
 """The ray tests of trimesh and of Open3D, run on our tracers from copies that the user has.
 
-    python tools/peer_ray_tests.py --trimesh ~/trimesh --open3d ~/Open3D   # a minute; prints what passed
+    python tools/peer_ray_tests.py --trimesh ~/trimesh --open3d ~/Open3D   # half a minute for trimesh
 
 The paths are those of checkouts of their repositories; nothing of theirs is in ours, and Open3D need not be installed.
 Each suite runs once for each tracer, in a process of its own, with an adapter in the place of the library's tracer

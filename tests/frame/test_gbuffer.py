@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from stress_cases.pictures import camera_rays
+from stress_cases.inputs import camera_rays
 
 import ldtrefl
 from ldtrefl.device import launch

@@ -1,7 +1,7 @@
-"""Case 14: a build of the kernels that checks every index, over shapes, materials, pictures, lights and skips.
+"""Case 14: kernels that check every index, run over shapes, materials, pictures, lights and skips.
 
-What a skip leaves out must not be read. The kernels are compiled in Warp's debug mode, in which an index outside its
-array ends the process; that is slow, so it is a process of its own, with few pixels.
+Data that a skip leaves out must not be read. The kernels are compiled in Warp's debug mode, in which an index outside
+its array ends the process. So the case runs in a process of its own; and with few pixels, as that mode is slow.
 """
 
 from __future__ import annotations
@@ -25,14 +25,15 @@ from ldtrefl.scene.description import Camera, Environment, Light, Lighting, Mate
 from .outcomes import Outcome
 
 NAME = "14 bounds"
-SMALL: dict[str, dict[str, Any]] = {
+Params = dict[str, int | list[int]]
+SMALL: dict[str, Params] = {
     "sphere": {"segments": [12, 6]},
     "torus": {"segments": [12, 6]},
     "torus_knot": {"segments": [24, 6]},
 }
 SMALL |= {"bowl": {"segments": [12, 4]}, "genus3": {"grid": 16}, "gyroid": {"grid": 16}, "teapot": {"segments": 2}}
-DENSE = {"segments": [1600, 100]}
-"""Of a torus knot whose triangles patches stand for."""
+DENSE: Params = {"segments": [1600, 100]}
+"""Parameters of a torus knot that is so fine that patches stand for its triangles."""
 
 OPTIONS: list[tuple[str, dict[str, Any]]] = [
     ("ldt", {}),
@@ -47,13 +48,19 @@ OPTIONS: list[tuple[str, dict[str, Any]]] = [
     ("envmap", {"resolution": 16}),
 ]
 
+SECONDS = 3600
+"""After which the process is given up."""
+
+SHOWN = 2000
+"""Characters from the end of its standard error that are shown if it fails."""
+
 
 def run(rays: int, pictures: int) -> list[Outcome]:
     """One in ``pictures`` variants of every shape, under every option."""
     start = time.perf_counter()
     command = [sys.executable, "-m", "stress_cases.bounds", str(pictures)]
     folder = Path(__file__).parent.parent
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=3600, cwd=folder)
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=SECONDS, cwd=folder)
     words = done.stdout.split()
     outcome = Outcome(NAME, "every index in its array", "all", tried=int(words[-1]) if words else 0)
     outcome.limit = "no index outside its array, all pixels finite"
@@ -61,11 +68,11 @@ def run(rays: int, pictures: int) -> list[Outcome]:
     outcome.passed = done.returncode == 0 and outcome.tried == 4 * len(OPTIONS)
     outcome.seconds = time.perf_counter() - start
     if not outcome.passed:
-        print(done.stderr[-2000:])
+        print(done.stderr[-SHOWN:])
     return [outcome]
 
 
-def variants(shape: str, params: dict[str, Any], picture: str) -> Iterator[dict[str, Any]]:
+def variants(shape: str, params: Params, picture: str) -> Iterator[dict[str, Any]]:
     """A shape smooth and flat, lit, glowing, mirroring and black, with a picture and without."""
     pictures = (None, picture) if shapes.make(shape, params).uvs is not None else (None,)
     for albedo, emission, mirror in ((0.8, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 0.9), (0.0, 0.0, 0.0)):

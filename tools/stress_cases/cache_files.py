@@ -1,9 +1,9 @@
-"""Case 15: files of the map cache that hash right and hold what no builder wrote, and things that are no files.
+"""Case 15: files of the map cache whose hash is right but whose contents no builder wrote, and what is no file at all.
 
-Every field of a file is set to what it cannot be, or some of its numbers are; then an object is peeled by a process
-that finds the file where its own would be, and its rays are traced. What cannot be true is refused with a warning and
-made anew, with the same answers. What could be (a plane in another place) is believed, and answers as it says: no
-memory is read that is not there, and no ray hangs.
+Every field of a file, or some of its numbers, is set to an impossible value. Then a process peels an object, finds the
+file where its own would be, and traces rays. Contents that are impossible must be refused with a warning and made anew,
+with the same answers. Contents that are possible (a plane in another place) may be believed, and give the answers that
+follow from them: but no memory may be read that is not there, and no ray may hang.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ VALUES: tuple[Any, ...] = (
     [0, 0, 0], [-1, 8, 8], [1e300] * 3, [2**40] * 3, [1, 2, 3, 4], [float("nan")] * 3,
 )  # fmt: skip
 
-Contents = tuple[dict[str, np.ndarray], dict[str, Any]]
+Contents = tuple[dict[str, np.ndarray], dict[str, object]]
 Spoiled = tuple[str, Callable[[MapCache, str], None]]
 """What was done, and what puts it into the place of a file."""
 
@@ -142,7 +142,7 @@ def _cleared(path: Path) -> None:
     path.unlink(missing_ok=True)
 
 
-def spoiled_fields(arrays: dict[str, np.ndarray], values: dict[str, Any]) -> Iterator[Spoiled]:
+def spoiled_fields(arrays: dict[str, np.ndarray], values: dict[str, object]) -> Iterator[Spoiled]:
     """Each array and each value of a file, left out or set to what it cannot be."""
     for name, array in arrays.items():
         others = {

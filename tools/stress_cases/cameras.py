@@ -14,14 +14,14 @@ from .pictures import Held, judge_reflections, surroundings
 NAME = "6 cameras"
 MIRROR = ldtrefl.Material(albedo=(0.05,) * 3, mirror=(0.9,) * 3)
 HELD = {
-    # By rounding an eye on the surface sees it, or what lies behind it: there pictures must be finite, no more.
+    # Whether an eye on the surface sees it or what lies behind it is decided by rounding: pictures must be finite.
     "on the mirror ball": Held(percent=100.0, linear_percent=100.0, lost=1.0),
     "inside the object": Held(reflector=0.0, hits=0.0),
     "looking away": Held(reflector=0.0, hits=0.0),
     # So wide that the ball is small although the eye all but touches it.
     "field of view 170": Held(linear_percent=5.0, reflector=0.02),
     "field of view 179": Held(linear_percent=5.0, reflector=0.003),
-    # One ray or as good as one: all of them meet the room.
+    # One ray, or many that are all but one: all of them meet the room.
     "field of view 0.01": Held(linear_percent=5.0, hits=1.0),
     "1 x 1": Held(linear_percent=5.0, hits=1.0),
 }

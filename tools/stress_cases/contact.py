@@ -29,7 +29,7 @@ def run(rays: int, pictures: int) -> list[Outcome]:
 
 
 def on_mirror(thing: ldtrefl.Object, pixels: int) -> ldtrefl.Scene:
-    """A thing over a flat mirror."""
+    """An object over a flat mirror."""
     return ldtrefl.Scene(
         camera=ldtrefl.Camera(eye=(0.5, -5.0, 2.0), look_at=(0.0, 0.0, 0.3), fov_y=40.0, width=pixels, height=pixels),
         objects=(ldtrefl.Object(shape="plane", scale=3.0, material=MIRROR), thing),
@@ -37,7 +37,7 @@ def on_mirror(thing: ldtrefl.Object, pixels: int) -> ldtrefl.Scene:
 
 
 def beside_ball(thing: ldtrefl.Object, pixels: int) -> ldtrefl.Scene:
-    """A thing beside a mirror ball."""
+    """An object beside a mirror ball."""
     ball = ldtrefl.Object(shape="sphere", params={"segments": [64, 32]}, material=MIRROR)
     return ldtrefl.Scene(
         camera=ldtrefl.Camera(eye=(1.0, -5.0, 1.0), look_at=(0.7, 0.0, 0.0), fov_y=40.0, width=pixels, height=pixels),

@@ -1,4 +1,4 @@
-"""Case 2: rays along axes, in planes, through corners and edges, grazing, and with directions that are hardly any."""
+"""Case 2: rays along axes, in planes, through corners and edges, grazing, and with directions of any length or none."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ldtrefl.scene import shapes
 
 from .inputs import rays_about, tracers
 from .judge import judge_mesh
-from .outcomes import Limit, Outcome, limits, linear_limit
+from .outcomes import TEXELS, Limit, Outcome, limits, linear_limit
 
 NAME = "2 directions"
 GRAZING = limits(
@@ -24,7 +24,7 @@ GRAZING = limits(
     linear=linear_limit(100.0, "the same, by a texel: finite answers alone"),
 )
 AIMED_SHARE = 20.0
-"""Percent of the rays aimed at vertices and edges that go by a silhouette's, where a hit or a miss is chance."""
+"""Percent of the rays aimed at vertices and edges that are aimed at a silhouette, where hit or miss is chance."""
 
 AIMED = limits(
     Limit(wrong=AIMED_SHARE, p99=np.inf, why="a hit or a miss at a silhouette's vertex is chance"),
@@ -75,10 +75,10 @@ def axis_rays(mesh: ldtrefl.Mesh, count: int, other: float) -> tuple[np.ndarray,
 
 
 def texel_rays(mesh: ldtrefl.Mesh, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Axis-parallel and diagonal rays that run exactly along texel and cell borders of a 256 map."""
+    """Axis-parallel and diagonal rays that run exactly along the borders of texels of a 256 map."""
     rng = np.random.default_rng(6)
     low, high = mesh.bounds
-    texel = (high - low).max() / 256
+    texel = (high - low).max() / TEXELS
     middle = (low + high) / 2
     points = middle + texel * rng.integers(-100, 101, (count, 3))
     directions = rng.integers(-1, 2, (count, 3)).astype(float)
@@ -87,7 +87,7 @@ def texel_rays(mesh: ldtrefl.Mesh, count: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def rays_to(mesh: ldtrefl.Mesh, targets: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Rays from about the mesh to given points, the farthest kind of aim that float32 can take."""
+    """Rays from about the mesh to given points, aimed as exactly as float32 can."""
     rng = np.random.default_rng(7)
     origins, _ = rays_about(mesh, count, 8)
     chosen = targets[rng.integers(0, len(targets), count)]
@@ -115,7 +115,7 @@ def grazing_rays(count: int, degrees: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def no_rays(mesh: ldtrefl.Mesh, count: int) -> list[Outcome]:
-    """Zero, infinite and NaN rays are misses and are counted; the good rays among them are not disturbed."""
+    """Zero, infinite and NaN rays are misses and are counted; the good rays among them are answered as without them."""
     origins, directions = rays_about(mesh, max(count, 64), 11)
     origins, directions = origins.copy(), directions.copy()
     bad = np.arange(0, len(origins), 2)

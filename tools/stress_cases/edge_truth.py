@@ -1,8 +1,9 @@
-"""What a ray that passes near edges and vertices may be answered, in float64, and who keeps to it.
+"""What may be answered to rays that pass near edges and vertices, in float64, and whether a tracer's answers are so.
 
 The truth is of the vertices as they were given, float64, and of the rays as they are handed over, float32. A tracer
 rounds the vertices to float32 in a unit space, by up to 2.6e-8 of the size, so it is free to answer as for a ray moved
-aside by an *allowance*, 1e-7 of the mesh's size, and for no other. That needs no sign of what is nearly 0:
+aside by an *allowance*, 1e-7 of the mesh's size, and for no other. This is found without asking for the sign of any
+number that is nearly 0:
 
 Triangles are *near* whose distance from the ray's line is at most the allowance; a ray can meet no other, however it
 is moved. Near triangles that share an edge within the allowance make one *patch* of surface. A patch's border is
@@ -43,13 +44,22 @@ ALIKE = 0.999
 """Least cosine between a hit's normal and that of its triangle."""
 
 FLOAT64 = 1e-6
-"""Of the allowance: float64's rounding many times over."""
+"""Share of the allowance by which it is widened: many roundings of a float64."""
 
 LADDER = (2e-7, 5e-7, 1e-6, 2e-6, 5e-6, 1e-5, 2e-5, 5e-5, 1e-4, 2e-4)
-"""Larger allowances, to say how far beside the answers are that the allowance does not explain."""
+"""Larger allowances, tried in turn on answers that the allowance does not explain: they tell how wrong those are."""
 
 AT_ONCE = 20_000
-"""Rays examined together: their boxes, triangles and patches fit in some hundred MB."""
+"""Rays examined at once, whose boxes, triangles and patches take some hundred megabytes."""
+
+LEAST_LENGTH = 1e-300
+"""To divide by: triangles without area have no normal."""
+
+LEAST_COMPONENT = 1e-200
+"""Of a direction: smaller ones are replaced by it, so that its inverse is finite."""
+
+WHOLE = 1e-6
+"""How far from a whole number a winding number may be by rounding."""
 
 
 @dataclass(frozen=True)
@@ -106,7 +116,7 @@ class SeenAlong:
             middle = self.along[:, 0] - slope_x * self.across[:, 0, 0] - slope_y * self.across[:, 0, 1]
             margin = allowance * np.hypot(slope_x, slope_y)
             low, high = np.clip(middle - margin, first, last), np.clip(middle + margin, first, last)
-        # Of a triangle seen edge on nothing more is known. The ray's start is as free as its line.
+        # A triangle seen edge on may be met anywhere along it. The ray's start is as free as its line.
         low, high = np.where(np.isnan(low), first, low), np.where(np.isnan(high), last, high)
         return low - allowance, high + allowance
 
@@ -120,9 +130,9 @@ class Patches:
     high: np.ndarray
     """Least and greatest distance along the ray of what is near."""
     must: np.ndarray
-    """Bool: a ray meets it however it is moved aside within the allowance."""
+    """Bool: however the ray is moved aside within the allowance, it meets the patch."""
     is_open: np.ndarray
-    """Bool: it has a border within the allowance, so that nothing follows for it."""
+    """Bool: it has a border within the allowance, so that the ray may meet it or not."""
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -156,7 +166,7 @@ class Surface:
         low, high = corners.min(axis=1), corners.max(axis=1)
         count = len(low)
         depth = max(int(np.ceil(np.log2(count))), 0)
-        # The last are fillers with boxes that nothing meets.
+        # The tree is filled up to a power of two with boxes that no ray meets.
         order = np.minimum(np.arange(2**depth), count)
         middle = np.vstack([(low + high) / 2, high[-1:]])
         for level in range(depth):
@@ -180,7 +190,7 @@ class Surface:
 
     def boxes_met(self, o: np.ndarray, d: np.ndarray, margin: float) -> tuple[np.ndarray, np.ndarray]:
         """(p,) rays and (p,) triangles whose boxes, wider by ``margin``, the ray meets."""
-        inverse = 1.0 / np.where(np.abs(d) < 1e-200, 1e-200, d)
+        inverse = 1.0 / np.where(np.abs(d) < LEAST_COMPONENT, LEAST_COMPONENT, d)
         ray, node = np.arange(len(o)), np.zeros(len(o), int)
         for level, boxes in enumerate(self._levels):
             if level > 0:
@@ -224,14 +234,14 @@ class Surface:
         links = coo_matrix((np.ones(len(pair)), (pair, count + shared)), shape=(count + len(names),) * 2)
         _, piece = connected_components(links, directed=False)
         patches, piece_of_pair = np.unique(piece[:count], return_inverse=True)
-        # Near edges with a side that nobody has: borders of the mesh, or of what lies behind the start.
+        # Near edges with a triangle on one side only: borders of the mesh, or of what lies behind the start.
         turns = np.bincount(shared, weights=self.turn[near.triangle[pair], corner], minlength=len(names))
         is_open = np.zeros(len(patches), bool)
         is_open[piece_of_pair[pair[turns[shared] != 0]]] = True
         # How often the border winds about the ray. Edges between two triangles of the patch cancel.
         angle = np.where(near.is_edge_near, 0.0, near.seen.angles()).sum(axis=1)
         winding = np.bincount(piece_of_pair, weights=angle, minlength=len(patches)) / (2.0 * np.pi)
-        assert (np.abs(winding - np.rint(winding))[~is_open] < 1e-6).all(), "a border that does not close"
+        assert (np.abs(winding - np.rint(winding))[~is_open] < WHOLE).all(), "a border that does not close"
         ray, low, high = np.zeros(len(patches), int), np.full(len(patches), np.inf), np.full(len(patches), -np.inf)
         ray[piece_of_pair] = near.ray
         pair_low, pair_high = near.seen.reach(allowance)
@@ -278,10 +288,10 @@ def what_is_right(surface: Surface, origins: np.ndarray, directions: np.ndarray,
 
 @dataclass(frozen=True)
 class Verdict:
-    """Rays by what is wrong with their answers, (n,) bool each."""
+    """What is wrong with the answers to n rays, (n,) bool each."""
 
     sticks_out: np.ndarray
-    """A hit on a triangle that the ray passes by more than the allowance beside."""
+    """A hit on a triangle that the ray misses by more than the allowance."""
     slips: np.ndarray
     """A miss where a patch must be met."""
     elsewhere: np.ndarray
@@ -309,7 +319,7 @@ def examine(right: Right, hits: ldtrefl.Hits) -> Verdict:
         is_there = (along >= np.maximum(low, 0.0) - slack) & (along <= high + slack)
         elsewhere[hit] = ~beside & ~(is_there & (along <= right.bound[hit] + slack))
         misnamed[hit] = ~beside & _is_misnamed(right.surface, seen, hits, hit)
-    # A miss with a distance is none.
+    # A miss must have t = +inf.
     elsewhere |= (triangle < 0) & ~np.isposinf(t)
     return Verdict(sticks_out, np.isposinf(t) & (triangle < 0) & right.must, elsewhere, misnamed)
 
@@ -324,5 +334,5 @@ def _is_misnamed(surface: Surface, seen: SeenAlong, hits: ldtrefl.Hits, hit: np.
     is_there = (across <= PLACE) & (along >= low) & (along <= high) & (weights.min(axis=1) >= -T_ROUNDING)
     a, b, c = np.moveaxis(surface.vertices[surface.mesh.faces[hits.triangle[hit]]], 1, 0)
     facet = np.cross(b - a, c - a)
-    cosine = (facet * hits.normal[hit]).sum(axis=1) / np.maximum(np.linalg.norm(facet, axis=1), 1e-300)
+    cosine = (facet * hits.normal[hit]).sum(axis=1) / np.maximum(np.linalg.norm(facet, axis=1), LEAST_LENGTH)
     return ~(is_there & (cosine >= ALIKE))

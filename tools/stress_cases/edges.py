@@ -28,13 +28,19 @@ CLOSEST, FARTHEST = 1e-7, 1e-4
 """Of the mesh's size, how far beside an edge or a vertex the rays are aimed: log-uniform."""
 
 REAL = ("spot.glb", "teapot.ply", "armadillo.ply")
-"""Closed meshes that are looked for in LDTREFL_MESH_PATH, and left out where they are missing."""
+"""Closed meshes of LDTREFL_MESH_PATH, which are left out where they are missing."""
 
 LATTICE = 2.0**-12
 """Vertices in multiples of this, in a mesh from -1 to 1: rays can be aimed at them and at edges' middles exactly."""
 
 LEAST_HITS = 0.2
-"""Share of the rays of a kind that must hit: where most are free to do either, nothing is tested."""
+"""Share of the rays of a kind that must hit: where most may do either, nothing is tested."""
+
+LEAST_LENGTH = 1e-300
+"""To divide by: triangles without area have no normal."""
+
+SAME_PLACE = 1e-12
+"""Of a mesh's size, how far vertices may lie apart that are one but for rounding."""
 
 Trace = Callable[[np.ndarray, np.ndarray], ldtrefl.Hits]
 Rays = tuple[np.ndarray, np.ndarray]
@@ -46,8 +52,8 @@ class Held:
     """What a tracer is held to for a kind of rays."""
 
     wrong: float = 0.0
-    """Share that may be answered otherwise than float64 does for any ray within the allowance, and share of hits that
-    may be named for another place."""
+    """Share of the rays that may be answered as no ray within the allowance truly is, and share of the hits whose
+    barycentrics or normal may be those of another place."""
     why: str = ""
 
 
@@ -137,10 +143,10 @@ def explaining_allowance(right: Right, rays: Rays, hits: ldtrefl.Hits) -> float:
 
 
 def welded(mesh: ldtrefl.Mesh) -> ldtrefl.Mesh:
-    """The mesh with vertices in one place, but for rounding, made one, and without triangles that are lines then."""
+    """The mesh with vertices that share a place but for rounding made one, and without triangles that become lines."""
     size = (mesh.bounds[1] - mesh.bounds[0]).max()
     number = np.arange(len(mesh.vertices))
-    for first, second in sorted(cKDTree(mesh.vertices).query_pairs(1e-12 * size)):
+    for first, second in sorted(cKDTree(mesh.vertices).query_pairs(SAME_PLACE * size)):
         number[second] = min(number[second], number[first])
     kept, place = np.unique(number, return_inverse=True)
     faces = place[mesh.faces]
@@ -217,10 +223,10 @@ class Targets:
 
 
 def targets(surface: Surface, count: int, rng: np.random.Generator, middles: bool = False) -> Targets:
-    """Every second a vertex, the others anywhere on edges, or at their middles alone."""
+    """Every second target is a vertex; the others lie anywhere on edges, or with ``middles`` in their middles."""
     a, b, c = np.moveaxis(surface.vertices[surface.mesh.faces], 1, 0)
     normals = np.cross(b - a, c - a)
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), LEAST_LENGTH)
     order = np.argsort(surface.edges.ravel())
     half = rng.integers(0, len(order) // 2, count)  # edges of closed meshes come in pairs
     one, other = order[2 * half], order[2 * half + 1]
@@ -230,11 +236,11 @@ def targets(surface: Surface, count: int, rng: np.random.Generator, middles: boo
     share[::2] = 0.0
     points = (1 - share)[:, None] * surface.vertices[start] + share[:, None] * surface.vertices[end]
     mean = normals[face] + normals[other // 3]
-    return Targets(points, mean / np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-300))
+    return Targets(points, mean / np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), LEAST_LENGTH))
 
 
 def unit_vectors(count: int, rng: np.random.Generator) -> np.ndarray:
-    """(n, 3) in all directions alike."""
+    """(n, 3) unit vectors, all directions alike."""
     vectors = rng.normal(size=(count, 3))
     return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
 
@@ -279,7 +285,8 @@ def from_within(surface: Surface, count: int, rng: np.random.Generator) -> Rays:
 
 
 def grazing(surface: Surface, count: int, rng: np.random.Generator) -> Rays:
-    """Along the surface but for a tenth to a millionth, from outside and from within: most edges are silhouettes."""
+    """Nearly along the surface, by slopes of a tenth to a millionth, from outside and within: most edges are
+    silhouettes."""
     at = targets(surface, count, rng)
     ways = np.cross(at.normals, unit_vectors(count, rng))
     ways /= np.linalg.norm(ways, axis=1, keepdims=True)

@@ -1,8 +1,9 @@
 """Case 12: spoilt scenes, meshes, pictures and kept maps, through the command line.
 
-Each file must give status 2 and one line, or status 0 and a picture that is whole, of the size asked for and finite;
-what is kept between runs cannot matter, so a damaged file of it must give the good picture to the bit. Never a signal,
-a traceback, or a file left behind; no more memory than ``MEMORY`` and no more time than ``SECONDS``.
+Each file must give status 2 and one line, or status 0 and a picture that is whole, finite, and of the size asked for.
+Maps that are kept between runs must not change a picture, so a damaged file of kept maps must give the good picture to
+the bit. No run may end by a signal or a traceback, leave a file behind, take more memory than ``MEMORY``, or more time
+than ``SECONDS``.
 """
 
 from __future__ import annotations
@@ -29,13 +30,13 @@ import ldtrefl
 from ldtrefl.cli import commands
 
 from . import mutations
-from .mutations import LOOP, MESHES, PICTURES
+from .good_files import LOOP, MESHES, PICTURES, write_good_meshes, write_good_pictures
 from .outcomes import Outcome
 
 NAME = "12 files"
 
 SECONDS = 10
-"""Of the processor, for a file of some kilobytes."""
+"""Of processor time, for a file of some kilobytes."""
 
 HANGS = 20
 """Seconds on the clock after which a process that does nothing counts as hung."""
@@ -44,6 +45,10 @@ MEMORY = 2 << 30
 """Bytes above those of the process that it is forked from."""
 
 SHARES = {"scenes": 0.3, "meshes": 0.35, "pictures": 0.25, "kept maps": 0.1}
+"""How many of the files are of each kind."""
+
+ADDRESS_SPACE = 16 << 30
+"""Bytes of address space above the parent's after which a child gets no memory: much more than it may use."""
 
 NO_FILE = 0.02
 """Share of the files in whose place stands a pipe, a folder, or a link to nowhere or without end."""
@@ -172,8 +177,8 @@ class Cases:
         # Threads of a parent do not live on in its children, which would wait for them.
         oiio.attribute("threads", 1)
         oiio.attribute("exr_threads", -1)
-        mutations.write_good_meshes(folder)
-        mutations.write_good_pictures(folder)
+        write_good_meshes(folder)
+        write_good_pictures(folder)
         ldtrefl.set_threads(1)
         things = {name: f'mesh = "{name}"\nfit = 1.0' for name in MESHES} | {"kept": KEPT}
         for name, thing in things.items():
@@ -262,7 +267,7 @@ def scene_text(thing: str, sky: str = "8.png", texture: str = "8.png") -> str:
 
 
 def render(scene: Path, output: Path, *options: str) -> int:
-    """The command line in this process, its report unheard."""
+    """The command line in this process, with its report thrown away."""
     with contextlib.redirect_stdout(io.StringIO()):
         return commands.main(["render", str(scene), "-o", str(output), "--threads", "1", *options])
 
@@ -288,7 +293,7 @@ def watched(case: Case, output: Path, parent: int) -> Attempt:
                 signal.alarm(HANGS)
                 resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS + 1))
                 resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-                resource.setrlimit(resource.RLIMIT_AS, (parent + (16 << 30), parent + (16 << 30)))
+                resource.setrlimit(resource.RLIMIT_AS, (parent + ADDRESS_SPACE, parent + ADDRESS_SPACE))
                 os.dup2(told.fileno(), 1)
                 os.dup2(said.fileno(), 2)
                 status = render(case.scene, output, *case.options)
@@ -359,7 +364,7 @@ def alike(fault: str) -> str:
 
 
 def keep(folder: Path, place: Path, case: Case, attempt: Attempt) -> None:
-    """A copy of everything that a fault needs, and how to see it."""
+    """Copy everything that shows a fault into ``place``, with the command that does."""
     shutil.rmtree(place, ignore_errors=True)
     shutil.copytree(folder, place, symlinks=True, copy_function=_copied)
     options = " ".join(case.options).replace(str(folder), ".")

@@ -22,6 +22,9 @@ NAME = "11 fuzz"
 RAYS = (1000, 5000)
 """Rays of an example, at least and at most."""
 
+DOUBTFUL = 1e-3
+"""Texels between a tracer's hit and Embree's from which float64 is asked: Embree computes in float32."""
+
 SHAPES = (
     "sphere",
     "box",
@@ -52,7 +55,8 @@ BVH = dataclasses.replace(
     why="Warp's tree finds triangles whose area is a rounding and planes seen edge on, and loses rays through vertices",
 )
 POOLED = {"exact": 2.0, "balanced": 2.0, "fast": 2.0, "linear": 50.0, "bvh": 1.0}
-"""Percent of all rays of all examples that may disagree, however well explained. A single example may be all ties."""
+"""Percent of the rays of all examples together that may disagree, however well explained: a single example may consist
+of ties alone."""
 TRACERS = ("exact", "balanced", "fast", "linear", "bvh")
 
 
@@ -147,7 +151,7 @@ def run(rays: int, pictures: int) -> list[Outcome]:
             for name in ("tried", "wrong_hits", "wrong_misses", "disagree", "explained", "defects", "misnamed"):
                 setattr(total, name, getattr(total, name) + getattr(outcome, name))
             total.non_finite += outcome.non_finite
-            # The worst example's, not the mean: what is usual hides what is not.
+            # Of the worst example, not of the mean, in which a bad example would not show.
             for name in ("worst", "p99", "p999", "radius"):
                 setattr(total, name, max(getattr(total, name), getattr(outcome, name)))
             total.seconds += time.perf_counter() - start
@@ -172,7 +176,7 @@ def limit_of(by: str, mesh: ldtrefl.Mesh | None, resolution: int = TEXELS) -> Li
                 return held
             why = f"{DENSE[by].why}; of 1000 grazing rays one passes between such patches, which no radius explains"
             return dataclasses.replace(held, p999=np.inf, defects=0.2, why=why)
-        # A texel of the map may be 16 of the 256 that are counted in.
+        # Errors are counted in texels of a 256 map, of which a texel of this map may be 16.
         coarser = TEXELS / resolution
         return dataclasses.replace(
             DENSE[by],
@@ -192,11 +196,11 @@ def corrected(
     truth: Truth, origins: np.ndarray, directions: np.ndarray, true_t: np.ndarray, hits: ldtrefl.Hits
 ) -> np.ndarray:
     """The truth again, in float64, for the rays where a tracer and Embree disagree."""
-    texel = 2 * truth.half / 256
+    texel = 2 * truth.half / TEXELS
     length = np.linalg.norm(directions.astype(float), axis=1)
     with np.errstate(invalid="ignore"):
         doubtful = np.isfinite(true_t) != (hits.triangle >= 0)
-        doubtful |= np.abs(true_t - hits.t) * length > 1e-3 * texel
+        doubtful |= np.abs(true_t - hits.t) * length > DOUBTFUL * texel
     rows = np.flatnonzero(doubtful)
     if len(rows) and truth.is_brute:
         true_t = true_t.copy()

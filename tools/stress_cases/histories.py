@@ -186,12 +186,12 @@ def threads_case(random: np.random.Generator, by: str, picture: str, rounds: int
 
 
 def picker(random: np.random.Generator) -> Pick:
-    """Picks at random."""
+    """A ``Pick`` that chooses at random."""
     return lambda values: values[int(random.integers(len(values)))]
 
 
 def sky(folder: Path) -> str:
-    """A picture of the environment that is another in every direction."""
+    """The path of a picture for the environment, which looks different in every direction."""
     path = folder / "sky.exr"
     ldtrefl.save_image(path, np.random.default_rng(3).uniform(0.0, 2.0, (8, 16, 3)).astype(np.float32))
     return str(path)

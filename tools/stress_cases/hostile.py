@@ -1,7 +1,7 @@
-"""Case 17: small inputs that ask for much, or that are not what they seem, each through the program in its own process.
+"""Case 17: small inputs that ask for much, or that are not what they seem, each given to the program in a process.
 
-Every one must end in the status that stands beside it, in time, with little memory, with at most one line on standard
-error, and with nothing left behind. Memory is the child's whole process, half a GiB of which is the program.
+Every trial must end with the status that stands beside it, in time, with little memory, with at most one line on
+standard error, and with no file left behind. Memory is that of the whole process, half a GiB of which is the program.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from .outcomes import Outcome
 
 NAME = "17 hostile inputs"
 SECONDS = 20
-"""Five of the promise, the start of the program, and a machine that does other things too."""
+"""Five that the program promises, its start, and a margin for a machine that does other things, too."""
 MEMORY = 1 << 30
 """What a refusal may take: half a GiB for the program, a largest scene file's 300 MiB, and room."""
 
@@ -50,7 +50,7 @@ class Trial:
 
     what: str
     words: str
-    """Of the shell, after the program's name."""
+    """Words of the shell after the program's name."""
     status: int = 2
     scene: str = SCENE
     """What ``case.toml`` holds."""
@@ -81,7 +81,7 @@ def run(rays: int, pictures: int) -> list[Outcome]:
 
 
 def scenes() -> list[Trial]:
-    """Texts that a reader of TOML, or what stands behind it, chokes on."""
+    """Texts that are too much for a reader of TOML, or for what reads the values."""
     render = "render case.toml"
 
     def with_line(what: str, line: str, status: int = 2) -> Trial:

@@ -1,4 +1,4 @@
-"""What cases give to tracers, and the tracers: rays about a mesh, a mesh elsewhere, every search and quality."""
+"""What cases share as input: tracers of every kind, rays about a mesh and of a camera, a mesh scaled and moved."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 import ldtrefl
+from ldtrefl.world.camera import camera_axes
 
 from .outcomes import TEXELS
 
@@ -35,3 +36,14 @@ def rays_about(mesh: ldtrefl.Mesh, count: int, seed: int = 0, reach: float = 2.5
 def moved(mesh: ldtrefl.Mesh, scale: object = 1.0, offset: object = 0.0) -> ldtrefl.Mesh:
     """The mesh scaled and moved."""
     return ldtrefl.Mesh(mesh.vertices * np.asarray(scale) + np.asarray(offset), mesh.faces)
+
+
+def camera_rays(camera: ldtrefl.Camera) -> tuple[np.ndarray, np.ndarray]:
+    """(h * w, 3) float64 origins and directions through the pixels' centres."""
+    right, down, forward = camera_axes(camera)
+    half = np.tan(np.radians(camera.fov_y / 2))
+    x, y = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
+    across = (2 * x / camera.width - 1) * half * camera.width / camera.height
+    along = (2 * y / camera.height - 1) * half
+    rays = forward + across[..., None] * right + along[..., None] * down
+    return np.broadcast_to(np.asarray(camera.eye, float), (x.size, 3)), rays.reshape(-1, 3)

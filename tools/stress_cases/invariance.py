@@ -1,4 +1,5 @@
-"""Case 9: what must not change the answer: quarter turns, order, threads, slices, runs; and turns by any angle."""
+"""Case 9: what must not change an answer: quarter turns and turns by any angle, the order of triangles and vertices,
+the number of threads and of slices, another run."""
 
 from __future__ import annotations
 
@@ -12,14 +13,29 @@ from ldtrefl.scene import shapes
 
 from .inputs import rays_about, tracers
 from .judge import judge
-from .outcomes import Outcome, limits
+from .outcomes import TEXELS, Outcome, limits
 from .pictures import METHODS, not_finite
 from .place import scene_at
 from .truth import Truth
 
 NAME = "9 invariance"
 SPREAD = 2.0
-"""The error may depend on the angle to the axes by this factor, over what chance gives."""
+"""Factor by which the number of wrong rays may depend on the angle to the axes, beside what chance gives."""
+
+DEVIATIONS = 3.0
+"""Standard deviations of the number of wrong rays that chance is given."""
+
+ELSEWHERE = 1e-4
+"""Difference in distance, on a mesh from -1 to 1, from which two hits are different ones."""
+
+AT_EDGES = 0.499
+"""Barycentrics farther than this from 1/2 are at an edge, where either triangle may be named."""
+
+OTHER_TRIANGLES = 1e-3
+"""Share of the rays that may meet another triangle at the same distance: two in one place."""
+
+OTHER_ORDER = 1e-5
+"""Radiance by which a picture may differ when the objects come in another order: sums are rounded otherwise."""
 
 FEWEST = 5000
 """Rays of a quarter turn: the paper's search differs in 2.6% of them, which a limit of 3% tells from chance."""
@@ -44,20 +60,20 @@ def compared(
     both = hit & (b.triangle >= 0)
     outcome = Outcome(NAME, what, by, tried=len(hit))
     outcome.wrong_hits, outcome.wrong_misses = int((hit & ~both).sum()), int(((b.triangle >= 0) & ~both).sum())
-    outcome.worst = float(np.abs(a.t[both] - b.t[both]).max(initial=0.0)) * 128
+    outcome.worst = float(np.abs(a.t[both] - b.t[both]).max(initial=0.0)) * TEXELS / 2
     outcome.limit = f"hits differ in <= {percent:g}% of the rays"
     differ = hit != (b.triangle >= 0)
-    differ[both] |= np.abs(a.t[both] - b.t[both]) > 1e-4
+    differ[both] |= np.abs(a.t[both] - b.t[both]) > ELSEWHERE
     outcome.defects = int(differ.sum())
     outcome.passed = bool(100.0 * outcome.defects <= percent * outcome.tried)
     if triangles is not None and by in ("exact", "bvh"):
-        other = both & (number != b.triangle) & (np.abs(a.barycentrics - 0.5).max(axis=1) < 0.499)
-        outcome.passed &= bool(other.sum() <= 1e-3 * outcome.tried)
+        other = both & (number != b.triangle) & (np.abs(a.barycentrics - 0.5).max(axis=1) < AT_EDGES)
+        outcome.passed &= bool(other.sum() <= OTHER_TRIANGLES * outcome.tried)
     return outcome
 
 
 def allowed(by: str, mesh: ldtrefl.Mesh) -> float:
-    """Percent of rays that float32 decides otherwise once the axes are exchanged."""
+    """Percent of the rays that float32's rounding may decide otherwise once the axes are exchanged."""
     if by in ("exact", "bvh") or (by != "linear" and len(mesh.faces) < 50_000):
         return 0.05
     if by == "linear":
@@ -118,7 +134,7 @@ def any_turn(mesh: ldtrefl.Mesh, rays: int) -> list[Outcome]:
         outcome.limit = (
             f"most wrong rays <= {SPREAD:g} times the mean, over three deviations of chance (most, least shown)"
         )
-        outcome.passed = bool(max(counts) <= SPREAD * mean + 3 * np.sqrt(mean + 1))
+        outcome.passed = bool(max(counts) <= SPREAD * mean + DEVIATIONS * np.sqrt(mean + 1))
         outcomes.append(outcome)
     return outcomes
 
@@ -146,8 +162,8 @@ def threads_and_runs(pixels: int) -> list[Outcome]:
         one, other = (ldtrefl.render(s, method, **options) for s in (scene, swapped))
         differ_by = np.abs(one.image - other.image).max(axis=2)
         outcome = Outcome(
-            NAME, "objects in another order", by, tried=differ_by.size, wrong_hits=int((differ_by > 1e-5).sum())
+            NAME, "objects in another order", by, tried=differ_by.size, wrong_hits=int((differ_by > OTHER_ORDER).sum())
         )
-        outcome.limit, outcome.passed = "the same picture", not bool((differ_by > 1e-5).any())
+        outcome.limit, outcome.passed = "the same picture", not bool((differ_by > OTHER_ORDER).any())
         outcomes.append(outcome)
     return outcomes

@@ -47,7 +47,7 @@ def run(rays: int, pictures: int) -> list[Outcome]:
 
 
 def patched(name: str, mesh: ldtrefl.Mesh) -> Outcome:
-    """Dense meshes are there to be answered by patches: triangles alone would test nothing that other meshes do not."""
+    """Whether patches stand for a dense mesh's triangles: without them it tests nothing that other meshes do not."""
     trees = [ldtrefl.peel(mesh.vertices, mesh.faces, TEXELS, quality=quality).tree for quality in ("balanced", "fast")]
     outcome = Outcome(NAME, f"{name}: patches stand for triangles", "peel", tried=2, limit="in both qualities")
     outcome.passed = all(tree.patches for tree in trees)

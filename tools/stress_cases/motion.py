@@ -13,17 +13,20 @@ from .pictures import METHODS, not_finite
 
 NAME = "10 motion"
 PERCENTILES = (50, 75, 90, 95, 99, 99.5, 99.9)
+FRAMES = 60
 ALLOWED = {"exact": 1.1, "balanced": 1.1, "fast": 2.0, "linear": 10.0, "bvh": 1.0}
-"""Times the truth's change from frame to frame, at every percentile. The patches of ``fast`` and the paper's blocks of
-texels move in steps: they flicker."""
+"""How much a method's pictures may change from frame to frame, in times the truth's change, at every percentile. The
+patches of ``fast`` and the paper's blocks of texels move in steps, so they flicker."""
 MIRROR = 0.1
 """Least share of the pixels that must see the mirror."""
 FLOOR = 1e-3
 """Radiance below which a change is not seen."""
+ROUNDING = 1e-9
+"""Of a ratio of two numbers that are the same."""
 
 
 def run(rays: int, pictures: int) -> list[Outcome]:
-    """60 frames of ``pictures`` pixels a side, of knots of few and of many triangles."""
+    """``FRAMES`` frames of ``pictures`` pixels a side, of knots of few and of many triangles."""
     outcomes = []
     for what, segments in (("knot of 3 k triangles", [96, 16]), ("knot of 375 k triangles", [1500, 125])):
         changes = {}
@@ -31,7 +34,7 @@ def run(rays: int, pictures: int) -> list[Outcome]:
             start = time.perf_counter()
             renderer = ldtrefl.Renderer(scene(segments, 0, pictures), method, **options)
             before, change, broken = None, [], 0
-            for i in range(60):
+            for i in range(FRAMES):
                 frame = renderer.render(camera=scene(segments, i, pictures).camera)
                 broken += not_finite(frame)
                 if before is not None:
@@ -41,17 +44,17 @@ def run(rays: int, pictures: int) -> list[Outcome]:
             compared = np.concatenate(change)
             spread = np.percentile(compared, PERCENTILES)
             changes[by] = spread
-            outcome = Outcome(NAME, what, by, tried=60 * pictures * pictures, non_finite=broken)
+            outcome = Outcome(NAME, what, by, tried=FRAMES * pictures * pictures, non_finite=broken)
             outcome.seconds = time.perf_counter() - start
-            # A truth that does not change, or is not seen, is no measure.
-            seen = len(compared) >= MIRROR * 59 * pictures * pictures
+            # A truth that hardly changes, or hardly shows the mirror, measures nothing.
+            seen = len(compared) >= MIRROR * (FRAMES - 1) * pictures * pictures
             outcome.passed = seen and float(spread[PERCENTILES.index(99)]) > 10 * FLOOR
             outcomes.append(outcome)
         for outcome in outcomes[-len(METHODS) :]:
             ratio = (changes[outcome.by] / np.maximum(changes["bvh"], FLOOR)).max()
             outcome.worst = float(ratio)
             outcome.limit = f"change from frame to frame <= {ALLOWED[outcome.by]:g} times the truth's (shown as worst)"
-            outcome.passed &= outcome.non_finite == 0 and ratio <= ALLOWED[outcome.by] + 1e-9
+            outcome.passed &= outcome.non_finite == 0 and ratio <= ALLOWED[outcome.by] + ROUNDING
     return outcomes
 
 

@@ -1,4 +1,4 @@
-"""Case 3: rays that start on the surface, on the box, on a texel's border, inside, far away, and behind everything."""
+"""Case 3: rays that start on the surface, on the box, on a texel's border, inside, far away, or behind the object."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy as np
 from ldtrefl.scene import shapes
 
 from .judge import judge_mesh
-from .outcomes import Limit, Outcome, limits, linear_limit
+from .outcomes import TEXELS, Limit, Outcome, limits, linear_limit
 
 NAME = "3 origins"
 TOUCHING = limits(
@@ -30,7 +30,7 @@ def run(rays: int, pictures: int) -> list[Outcome]:
     on_box = in_box.copy()
     axis = rng.integers(0, 3, rays)
     on_box[np.arange(rays), axis] = np.where(rng.random(rays) < 0.5, low[axis], high[axis])
-    texel = (high - low).max() / 256
+    texel = (high - low).max() / TEXELS
     on_border = (low + high) / 2 + texel * np.round((in_box - (low + high) / 2) / texel)
     outcomes = judge_mesh(NAME, "on the surface", mesh, on_surface, directions, TOUCHING)
     outcomes += judge_mesh(NAME, "on vertices", mesh, corners[:, 0], directions, TOUCHING)

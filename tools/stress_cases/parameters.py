@@ -1,4 +1,4 @@
-"""Case 8: map resolutions from 16 to 4096, any number of steps, objects of one texel."""
+"""Case 8: map resolutions from 16 to 4096, any number of steps, objects as thin as a texel."""
 
 from __future__ import annotations
 

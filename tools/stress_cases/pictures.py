@@ -1,4 +1,8 @@
-"""What the cases about pictures share: whole frames, and reflected rays followed by nobody's tracer of ours."""
+"""What the cases about pictures share: frames by every method, and a reference for where reflected rays end.
+
+The reference makes camera rays and reflected rays in float64 and traces them by Embree. It uses no code of ours but
+that of the scene.
+"""
 
 from __future__ import annotations
 
@@ -10,8 +14,8 @@ import numpy as np
 
 import ldtrefl
 from ldtrefl.scene import shapes
-from ldtrefl.world.camera import camera_axes
 
+from .inputs import camera_rays
 from .outcomes import LINEAR_WORST, TEXELS, Outcome
 from .truth import Truth
 
@@ -44,14 +48,15 @@ def not_finite(frame: ldtrefl.Frame) -> int:
 def judge_same_pictures(
     case: str, what: str, a: ldtrefl.Scene, b: ldtrefl.Scene, percent: float, most: float = 0.02
 ) -> list[Outcome]:
-    """Both scenes look the same but for ``percent`` of the pixels, which may differ by more than ``most``."""
+    """By every method: both scenes look the same, but for ``percent`` of the pixels that may differ by more than
+    ``most``."""
     outcomes = []
     for (by, one, _), (_, other, seconds) in zip(frames(a), frames(b), strict=True):
         differ = np.abs(one.image - other.image).max(axis=2) > most
         outcome = Outcome(case, what, by, tried=differ.size, wrong_hits=int(differ.sum()), seconds=seconds)
         outcome.non_finite = not_finite(one) + not_finite(other)
         outcome.limit = f"<= {percent:g}% of the pixels differ by more than {most:g}"
-        # Pictures of nothing are the same too.
+        # Pictures that show no reflection are the same too, but say nothing.
         outcome.passed = min(frame.reflector_mask.mean() for frame in (one, other)) >= Held.reflector
         outcome.passed &= one.hits is not None and bool((one.hits.object >= 0).any())
         outcome.passed &= outcome.non_finite == 0 and bool(100.0 * differ.mean() <= percent)
@@ -66,19 +71,8 @@ def surroundings(scale: float = 8.0) -> ldtrefl.Object:
     return ldtrefl.Object(mesh=ldtrefl.Mesh(room.vertices, room.faces[np.arange(len(room.faces)) % 3 > 0]), scale=scale)
 
 
-def camera_rays(camera: ldtrefl.Camera) -> tuple[np.ndarray, np.ndarray]:
-    """(h * w, 3) float64 origins and directions through the pixels' centres."""
-    right, down, forward = camera_axes(camera)
-    half = np.tan(np.radians(camera.fov_y / 2))
-    x, y = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
-    across = (2 * x / camera.width - 1) * half * camera.width / camera.height
-    along = (2 * y / camera.height - 1) * half
-    rays = forward + across[..., None] * right + along[..., None] * down
-    return np.broadcast_to(np.asarray(camera.eye, float), (x.size, 3)), rays.reshape(-1, 3)
-
-
 class Reference:
-    """Primary and reflected rays of a scene, made in float64 and followed by Embree: no rasteriser, no map."""
+    """Camera rays and reflected rays of a scene, made in float64 and traced by Embree."""
 
     def __init__(self, scene: ldtrefl.Scene) -> None:
         self.scene = scene
@@ -89,7 +83,7 @@ class Reference:
         self.truths = [Truth(mesh, always_embree=True) for mesh in meshes]
 
     def first(self, o: np.ndarray, d: np.ndarray, without: np.ndarray | None = None) -> tuple[np.ndarray, ...]:
-        """(t, object, triangle) of the first hits; ``without`` holds an object per ray that is not looked for."""
+        """(n,) t, object and triangle of first hits; ``without`` holds an object for each ray to pass through."""
         t, index, triangle = np.full(len(o), np.inf), np.full(len(o), -1), np.full(len(o), -1)
         for k, truth in enumerate(self.truths):
             found, number = truth.first_hits(o, d)
@@ -142,7 +136,7 @@ class Reference:
 
 @dataclass(frozen=True)
 class Held:
-    """What reflections are held to, and how much of them there must be for that to mean anything."""
+    """What reflections are held to, and how much of them a picture must show so that the comparison means something."""
 
     percent: float = 0.2
     """Percent of the reflector's pixels that may end on another object, or ``OFF`` texels or more from the true
@@ -226,6 +220,7 @@ def judge_frame(
 
 
 def _halves(scene: ldtrefl.Scene) -> list[float]:
+    """Half the longest side of every object, in the world."""
     halves = []
     for entry in scene.objects:
         matrix = entry.world_from_object()

@@ -13,7 +13,7 @@ from .outcomes import Limit, Outcome, limits, linear_limit
 from .pictures import judge_same_pictures
 
 SAME_PICTURE = 0.1
-"""Percent of pixels that may differ by more than 2% when the whole scene is scaled and moved: silhouettes."""
+"""Percent of the pixels, silhouettes, that may differ by more than 2% when the whole scene is scaled and moved."""
 
 
 def run(rays: int, pictures: int) -> list[Outcome]:

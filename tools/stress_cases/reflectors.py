@@ -1,4 +1,4 @@
-"""Case 7: mirrors of one triangle, faceted, tiny and bent, hollow, and with normals that are of no use."""
+"""Case 7: mirrors of one triangle, faceted, tiny and bent, hollow, and with useless normals."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ NAME = "7 reflectors"
 MIRROR = ldtrefl.Material(albedo=(0.05,) * 3, mirror=(0.9,) * 3)
 HELD = {
     "strongly bent under one pixel": Held(linear_percent=5.0, reflector=0.01),
-    # Smaller than what lies between the centres of pixels: it is not seen.
+    # Smaller than the distance between pixels' centres, so that no pixel sees it.
     "a tenth of a pixel": Held(reflector=0.0, hits=0.0),
 }
 
