@@ -39,7 +39,7 @@ from ldtrefl.scene.description import Scene, load_scene
 from ldtrefl.scene.mesh import Mesh
 from ldtrefl.scene.readers.mesh_files import load_mesh
 from ldtrefl.scene.toml_text import check_regular, parse_toml
-from ldtrefl.world.device_scene import DeviceMesh
+from ldtrefl.world.device_mesh import DeviceMesh
 
 PROGRESS_AFTER = 1.0
 """Seconds before a progress bar is shown."""

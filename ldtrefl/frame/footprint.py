@@ -13,7 +13,7 @@ import numpy as np
 from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.regions import Culled
 from ldtrefl.tracing.rays import RayBuffer, distance_across, rays_of, run_count
-from ldtrefl.world.device_scene import DeviceObject
+from ldtrefl.world.device_object import DeviceObject
 
 FINEST = 5.0
 """Percentile of an object's footprints that stands for all of them."""

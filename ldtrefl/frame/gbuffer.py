@@ -20,7 +20,8 @@ from ldtrefl.geometry.vectors import as_double, from_to
 from ldtrefl.scene.description import Camera
 from ldtrefl.shading.shade import Surface, surface_at
 from ldtrefl.world.camera import Band, CameraView, camera_ray, camera_view
-from ldtrefl.world.device_scene import DeviceScene, ObjectRecord
+from ldtrefl.world.device_scene import DeviceScene
+from ldtrefl.world.records import ObjectRecord
 from ldtrefl.world.unit_rays import unit_vertex
 
 BAND_PIXELS = 1 << 20

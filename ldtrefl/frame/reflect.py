@@ -36,7 +36,7 @@ from ldtrefl.tracing.hit import Hit, no_hit
 from ldtrefl.tracing.rays import HitBuffer, RayBuffer, Regions, lowest_bit, object_bits
 from ldtrefl.tracing.trace import Query, Tracer, block_of, occluded_of, outlier_merger
 from ldtrefl.world.camera import camera_ray
-from ldtrefl.world.device_scene import LightingRecord, ObjectRecord
+from ldtrefl.world.records import LightingRecord, ObjectRecord
 from ldtrefl.world.unit_rays import into_unit, start_above, start_above_own, unit_normal
 
 BEYOND = wp.constant(1.000001)

@@ -26,7 +26,8 @@ from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.geometry.sphere import meets_sphere
 from ldtrefl.geometry.vectors import as_double, as_single
 from ldtrefl.tracing.rays import RUN, RayBuffer, Regions, objects_in, regions_of_runs, run_count, word_count
-from ldtrefl.world.device_scene import DeviceScene, ObjectRecord
+from ldtrefl.world.device_scene import DeviceScene
+from ldtrefl.world.records import ObjectRecord
 
 CullTest = Literal["safe", "flat"]
 

@@ -27,7 +27,8 @@ from ldtrefl.geometry.perspective_raster import (
 )
 from ldtrefl.scene.description import Camera
 from ldtrefl.world.camera import Band, pixels_from_world, whole_image
-from ldtrefl.world.device_scene import DeviceScene, ObjectRecord
+from ldtrefl.world.device_scene import DeviceScene
+from ldtrefl.world.records import ObjectRecord
 
 LARGE_BOX = wp.constant(4096)
 """Pixels in a triangle's box from which it is drawn in strips of rows, so that all threads share it."""

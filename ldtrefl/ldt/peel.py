@@ -25,7 +25,7 @@ from ldtrefl.device.bins import bin_items, exclusive_scan
 from ldtrefl.geometry.fixed_raster import FixedTriangle, cover, fixed_triangle, interpolate, snap, unsnap
 from ldtrefl.ldt.linear.occupancy import Occupancy, occupancy_of
 from ldtrefl.ldt.texel_frame import TexelFrame
-from ldtrefl.world.device_scene import DeviceMesh
+from ldtrefl.world.device_mesh import DeviceMesh
 
 INSERTION_LIMIT = wp.constant(24)
 """Fragments in a texel up to which insertion sort beats heap sort."""

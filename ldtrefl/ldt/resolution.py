@@ -10,7 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from ldtrefl.ldt.texture import FEWEST_TEXELS, MOST_TEXELS
-from ldtrefl.world.device_scene import DeviceMesh, DeviceScene
+from ldtrefl.world.device_mesh import DeviceMesh
+from ldtrefl.world.device_scene import DeviceScene
 
 TEXEL = {"exact": 0.25, "linear": 0.75}
 """Texels in footprints for an error of one pixel, by search. Measured on the paper's scenes, sideways to the ray, at

@@ -29,7 +29,7 @@ from ldtrefl.ldt.searches import TRACERS
 from ldtrefl.ldt.texel_frame import FACE_NAMES, TexelFrame, texel_frame
 from ldtrefl.scene.mesh import Mesh
 from ldtrefl.tracing.trace import Hits, array_of_views, occluded_batch, trace_batch, trace_in_unit_space
-from ldtrefl.world.device_scene import DeviceMesh
+from ldtrefl.world.device_mesh import DeviceMesh
 
 FORMAT = 1
 """Of saved files; goes up when what they hold changes."""

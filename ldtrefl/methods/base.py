@@ -23,7 +23,8 @@ from ldtrefl.frame.reflect import BoundTracer, FirstHits
 from ldtrefl.frame.skips import Choice, chosen, names
 from ldtrefl.tracing.bvh import BVH, BvhView, Raycaster
 from ldtrefl.tracing.trace import array_of_views
-from ldtrefl.world.device_scene import DeviceMesh, DeviceScene
+from ldtrefl.world.device_mesh import DeviceMesh
+from ldtrefl.world.device_scene import DeviceScene
 
 CONFIG = ConfigDict(extra="forbid", use_attribute_docstrings=True)
 """How every method's ``Config`` is checked."""

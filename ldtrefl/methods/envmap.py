@@ -26,7 +26,8 @@ from ldtrefl.frame.reflect import BoundTracer, no_shadows, shade_gbuffer
 from ldtrefl.methods.base import CONFIG, CommonConfig, Method, Reflection, Trees
 from ldtrefl.scene.description import Camera
 from ldtrefl.tracing.rays import RayBuffer
-from ldtrefl.world.device_scene import DeviceObject, DeviceScene
+from ldtrefl.world.device_object import DeviceObject
+from ldtrefl.world.device_scene import DeviceScene
 
 PIXEL_BYTES = 12
 """Of a cube map."""

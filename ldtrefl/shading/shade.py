@@ -12,7 +12,7 @@ import warp as wp
 
 from ldtrefl.geometry.triangle import ONE_THIRD, plane_coordinates
 from ldtrefl.geometry.vectors import as_double, as_single, from_to
-from ldtrefl.world.device_scene import LightingRecord, ObjectRecord
+from ldtrefl.world.records import LightingRecord, ObjectRecord
 
 SMALLEST_NORMAL = wp.constant(1.0e-12)
 """Squared length below which a vertex normal says nothing and the facet's is taken."""

@@ -25,7 +25,7 @@ from ldtrefl.tracing.trace import (
     one_by_one,
     trace_batch,
 )
-from ldtrefl.world.device_scene import DeviceMesh
+from ldtrefl.world.device_mesh import DeviceMesh
 from ldtrefl.world.outliers import Outliers
 from ldtrefl.world.unit_rays import SPHERE, distance_passed
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from ldtrefl.world.device_scene import ObjectRecord
+from ldtrefl.world.records import ObjectRecord
 
 RUN = wp.constant(64)
 """Rays in a row that are culled together. The rays of the first bounce stand in blocks of 8 x 8 pixels."""

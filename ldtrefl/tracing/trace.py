@@ -19,7 +19,7 @@ from ldtrefl.device import launch, warp_abi
 from ldtrefl.device.native_sources import native_body
 from ldtrefl.geometry.triangle import ONE_THIRD
 from ldtrefl.tracing.hit import Hit
-from ldtrefl.world.device_scene import DeviceMesh
+from ldtrefl.world.device_mesh import DeviceMesh
 
 RAY_BLOCK = wp.constant(64)
 """Rays that are searched for together on the CPU: as many as a block of 8 x 8 pixels has."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import warp as wp
 
 from ldtrefl.geometry.vectors import as_double, as_single
-from ldtrefl.world.device_scene import ObjectRecord
+from ldtrefl.world.records import ObjectRecord
 
 NEAR = wp.constant(wp.float64(8.0))
 """Unit space: coordinates up to which float32 does for where a ray starts."""

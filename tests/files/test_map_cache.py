@@ -25,7 +25,7 @@ from ldtrefl.ldt.peel import check_fragments, check_order
 from ldtrefl.ldt.texel_frame import texel_frame
 from ldtrefl.ldt.texture import peel_mesh
 from ldtrefl.scene import shapes
-from ldtrefl.world.device_scene import DeviceMesh
+from ldtrefl.world.device_mesh import DeviceMesh
 from tests.conftest import SMALL_SCENE
 
 KNOT = {"segments": [300, 40]}

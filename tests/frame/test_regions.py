@@ -9,7 +9,7 @@ from ldtrefl.device import launch
 from ldtrefl.frame.regions import cull_runs, shows_flat
 from ldtrefl.scene.description import Camera, Material, Object, Scene
 from ldtrefl.tracing.rays import RUN, RayBuffer
-from ldtrefl.world.device_scene import ObjectRecord
+from ldtrefl.world.records import ObjectRecord
 from tests.conftest import SCENES
 
 SPHERES = 50

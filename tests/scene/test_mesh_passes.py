@@ -9,7 +9,7 @@ import ldtrefl
 from ldtrefl.device import launch
 from ldtrefl.scene.mesh import MOST_VERTICES
 from ldtrefl.scene.mesh_passes import RUN, RUNS
-from ldtrefl.world.device_scene import DeviceMesh
+from ldtrefl.world.device_mesh import DeviceMesh
 
 BLOCK = int(RUN * RUNS)
 SIZES = (1, 2, int(RUN), BLOCK - 1, BLOCK, BLOCK + 1, 3 * BLOCK + 5)

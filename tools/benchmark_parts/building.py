@@ -11,7 +11,7 @@ import ldtrefl
 from ldtrefl.device import launch
 from ldtrefl.ldt.texture import LayeredDepthTexture, peel_mesh
 from ldtrefl.tracing.bvh import Raycaster
-from ldtrefl.world.device_scene import DeviceMesh
+from ldtrefl.world.device_mesh import DeviceMesh
 
 from .cores import one_core
 from .models import Model

@@ -12,7 +12,7 @@ from ldtrefl.device import launch
 from ldtrefl.ldt.texture import peel_mesh
 from ldtrefl.renderer import Renderer
 from ldtrefl.scene import shapes
-from ldtrefl.world.device_scene import DeviceMesh
+from ldtrefl.world.device_mesh import DeviceMesh
 
 from .common import ROOT, SKIPS_BUT_FRAMES
 from .models import load

@@ -13,7 +13,7 @@ from ldtrefl.device import launch
 from ldtrefl.ldt.searches import TRACERS
 from ldtrefl.ldt.texture import peel_mesh
 from ldtrefl.scene import shapes
-from ldtrefl.world.device_scene import DeviceMesh
+from ldtrefl.world.device_mesh import DeviceMesh
 
 from .common import Batch
 from .models import KNOTS

@@ -29,7 +29,7 @@ from ldtrefl.device import launch
 from ldtrefl.files.map_cache import HEADER, MAGIC, Entry, MapCache, keep_maps_in
 from ldtrefl.ldt.texture import peel_mesh
 from ldtrefl.scene import shapes
-from ldtrefl.world.device_scene import DeviceMesh
+from ldtrefl.world.device_mesh import DeviceMesh
 
 from .inputs import rays_about
 from .outcomes import Outcome

@@ -34,7 +34,7 @@ from ldtrefl.ldt.exact.tree import (
     TreeView,
     aligned_empty,
 )
-from ldtrefl.world.device_scene import DeviceMesh
+from ldtrefl.world.device_mesh import DeviceMesh
 
 CELLS_PER_ROOT = 0.13
 """Cells along the longest side per square root of the items, so that some twenty lie in an occupied one. From 0.08 to

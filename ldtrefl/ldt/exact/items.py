@@ -10,7 +10,7 @@ import warp as wp
 from ldtrefl.ldt.exact.build import Items, build_tree
 from ldtrefl.ldt.exact.record_choice import MixedRecords, Quality, choose_records
 from ldtrefl.ldt.exact.tree import Tree
-from ldtrefl.world.device_scene import DeviceMesh
+from ldtrefl.world.device_mesh import DeviceMesh
 
 
 def tree_of(geometry: DeviceMesh, resolution: int, quality: Quality, *, trusted: bool = False) -> Tree:

@@ -29,7 +29,7 @@ from ldtrefl.geometry.fixed_raster import (
 from ldtrefl.ldt.exact.pieces import LARGE, Piece, cell_number, number_of_cell
 from ldtrefl.ldt.peel import snapped_vertices
 from ldtrefl.ldt.texel_frame import TexelFrame, point_from_texel
-from ldtrefl.world.device_scene import DeviceMesh
+from ldtrefl.world.device_mesh import DeviceMesh
 
 FACING = wp.constant(0.55)
 """|n . axis| from which a map keeps a fragment as a patch: every direction faces one of the three with 0.577 or more.

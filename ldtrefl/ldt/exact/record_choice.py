@@ -32,7 +32,7 @@ from ldtrefl.ldt.exact.patch_check import doubts_of, no_doubts
 from ldtrefl.ldt.exact.patches import PATCH_MARGIN, Survey
 from ldtrefl.ldt.texel_frame import TexelFrame, texel_frame
 from ldtrefl.scene.mesh import Mesh
-from ldtrefl.world.device_scene import DeviceMesh
+from ldtrefl.world.device_mesh import DeviceMesh
 
 Quality = Literal["fast", "balanced", "exact"]
 

@@ -21,7 +21,7 @@ import numpy as np
 import warp as wp
 
 from ldtrefl.device import warp_abi
-from ldtrefl.world.device_scene import DeviceMesh
+from ldtrefl.world.device_mesh import DeviceMesh
 from ldtrefl.world.outliers import Outliers
 
 LANES = wp.constant(8)

@@ -11,7 +11,7 @@ from ldtrefl.device import launch
 from ldtrefl.ldt.exact import record_choice
 from ldtrefl.ldt.exact.record_choice import Sample, choose_records, pays
 from ldtrefl.scene import shapes
-from ldtrefl.world.device_scene import DeviceMesh
+from ldtrefl.world.device_mesh import DeviceMesh
 
 RESOLUTION = 256
 DEVICE = launch.resolve_device(None)

@@ -1,0 +1,74 @@
+"""Colours and textures of a mesh's parts on a device."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+
+from ldtrefl.base.errors import InputError
+from ldtrefl.scene.mesh import Mesh
+
+
+@dataclass(frozen=True, eq=False)
+class Appearance:
+    """Colours and textures of a mesh's parts; the fields of ``ObjectRecord`` with the same names say what they hold."""
+
+    part_first: wp.array
+    part_color: wp.array
+    part_texture: wp.array
+    texels: wp.array
+    texel_bytes: wp.array
+
+    @property
+    def has_textures(self) -> bool:
+        """Whether any part has a texture."""
+        return bool(self.texels.shape[0] + self.texel_bytes.shape[0] > 0)
+
+
+def appearance_of(mesh: Mesh, texture: np.ndarray | None, device: wp.Device) -> Appearance:
+    """Upload the colours and textures of a mesh's parts. ``texture``, (h, w, 3), takes the place of all parts' own
+    textures if it is given.
+
+    Raises:
+        InputError: there is a texture, and the mesh has no texture coordinates; or the textures have too many texels.
+    """
+    textures = [part.texture if texture is None else texture for part in mesh.parts]
+    pools: dict[type, list[np.ndarray]] = {np.float32: [], np.uint8: []}
+    places: dict[int, tuple[int, int, int, int]] = {}
+    for picture in textures:
+        if picture is not None and id(picture) not in places:
+            kind = np.uint8 if picture.dtype == np.uint8 else np.float32
+            first = sum(len(pool) for pool in pools[kind])
+            places[id(picture)] = (first, picture.shape[1], picture.shape[0], int(kind is np.uint8))
+            pools[kind].append(np.ascontiguousarray(picture, kind).reshape(-1, 3))
+    if places and mesh.uvs is None:
+        raise InputError("material.texture: the object has no texture coordinates (UVs)")
+    table = [(0, 0, 0, 0) if picture is None else places[id(picture)] for picture in textures]
+    return Appearance(
+        wp.array([p.first_triangle for p in mesh.parts], dtype=wp.int32, device=device),
+        wp.array([p.color for p in mesh.parts], dtype=wp.vec3, device=device),
+        wp.array(table, dtype=wp.vec4i, device=device),
+        _joined(pools[np.float32], wp.vec3, device),
+        _joined(pools[np.uint8], wp.vec3ub, device),
+    )
+
+
+def _joined(pools: list[np.ndarray], dtype: type, device: wp.Device) -> wp.array:
+    """(n, 3) arrays, one after the other, on a device. On the CPU a single one is read where it lies: it may be large.
+
+    Raises:
+        InputError: they are more than can be numbered.
+    """
+    total = sum(len(pool) for pool in pools)
+    if total > np.iinfo(np.int32).max:
+        raise InputError(f"an object's textures have {total} texels, at most {np.iinfo(np.int32).max} allowed")
+    if len(pools) == 1:
+        return wp.array(pools[0], dtype=dtype, device=device, copy=False)
+    joined = wp.empty(total, dtype=dtype, device=device)
+    first = 0
+    for pool in pools:
+        wp.copy(joined, wp.array(pool, dtype=dtype, device=device, copy=False), dest_offset=first)
+        first += len(pool)
+    return joined

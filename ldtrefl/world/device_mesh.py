@@ -1,0 +1,71 @@
+"""A mesh on a device. Objects with the same mesh share its arrays."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+import warp as wp
+
+from ldtrefl.device import warp_abi
+from ldtrefl.scene.mesh import Mesh
+from ldtrefl.world.appearance import Appearance, appearance_of
+from ldtrefl.world.outliers import Outliers, outliers_of
+
+
+class DeviceMesh:
+    """A mesh's arrays on a device. Normals, texture coordinates and textures, which only shading needs, are uploaded
+    when they are first asked for. On the CPU all arrays are the mesh's own memory, which nobody writes."""
+
+    def __init__(self, mesh: Mesh, device: wp.Device) -> None:
+        self.mesh = mesh
+        self.vertices = wp.array(mesh.unit_vertices, dtype=wp.vec3, device=device, copy=False)
+        self.faces = wp.array(mesh.faces, dtype=wp.vec3i, device=device, copy=False)
+        self.attribute_bytes = 0
+        """Bytes of the normals and texture coordinates that have been uploaded."""
+        self._appearances: dict[int, tuple[np.ndarray | None, Appearance]] = {}
+        """By ``id`` of the texture, which is kept beside."""
+
+    @functools.cached_property
+    def outliers(self) -> Outliers:
+        """The mesh's triangles far outside its bulk."""
+        return outliers_of(self.mesh, self.vertices.device)
+
+    @functools.cached_property
+    def exact_vertices(self) -> wp.array:
+        """(n,) vec3d in unit space if the mesh has outliers, else empty: float32 then holds for all of it."""
+        centre, half = self.mesh.unit_frame
+        exact = (self.mesh.vertices - centre) / half if len(self.mesh.outliers) else np.zeros((0, 3))
+        return wp.array(exact, dtype=wp.vec3d, device=self.vertices.device, copy=False)
+
+    @functools.cached_property
+    def normals(self) -> wp.array:
+        """(n,) vec3 shading normals."""
+        return self._attribute(self.mesh.normals, wp.vec3)
+
+    @functools.cached_property
+    def uvs(self) -> wp.array:
+        """(n,) vec2 texture coordinates, empty if the mesh has none."""
+        return self._attribute(np.zeros((0, 2), np.float32) if self.mesh.uvs is None else self.mesh.uvs, wp.vec2)
+
+    def _attribute(self, values: np.ndarray, dtype: type) -> wp.array:
+        uploaded = wp.array(values, dtype=dtype, device=self.vertices.device, copy=False)
+        self.attribute_bytes += warp_abi.array_bytes(uploaded)
+        return uploaded
+
+    @functools.cached_property
+    def no_normals(self) -> wp.array:
+        """An empty array in the place of the normals, for objects whose shading reads none."""
+        return wp.empty(0, dtype=wp.vec3, device=self.vertices.device)
+
+    @functools.cached_property
+    def no_uvs(self) -> wp.array:
+        """An empty array in the place of the texture coordinates, for objects whose shading reads none."""
+        return wp.empty(0, dtype=wp.vec2, device=self.vertices.device)
+
+    def appearance(self, texture: np.ndarray | None) -> Appearance:
+        """The colours and textures of the mesh's parts; ``texture``, (h, w, 3), takes the place of all parts' own if it
+        is given. Objects with the same mesh and texture share one."""
+        if id(texture) not in self._appearances:
+            self._appearances[id(texture)] = texture, appearance_of(self.mesh, texture, self.vertices.device)
+        return self._appearances[id(texture)][1]

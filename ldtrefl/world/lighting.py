@@ -1,0 +1,58 @@
+"""Lights and environment on a device, in device space."""
+
+from __future__ import annotations
+
+import numpy as np
+import warp as wp
+
+from ldtrefl.scene.description import Light, Scene
+from ldtrefl.world.records import LightingRecord, LightRecord
+
+BRIGHTEST = 1e30
+"""Intensity of a point light in device units: what is brighter is white all the same, and this is finite in float32."""
+
+
+def lighting_of(
+    scene: Scene, device_from_world: np.ndarray, decoded: wp.array, device: wp.Device, before: LightingRecord | None
+) -> LightingRecord:
+    """The lights and the environment of a scene; ``up`` is the camera's, and set before every frame.
+
+    Args:
+        device_from_world: (4, 4) float64.
+        decoded: (256,) float32, the linear value of every byte.
+        before: one whose environment picture is the scene's, and is used again.
+    """
+    record = LightingRecord()
+    lights = [_light(light, device_from_world) for light in scene.lights]
+    record.lights = (
+        wp.array(lights, dtype=LightRecord, device=device) if lights else wp.empty(0, dtype=LightRecord, device=device)
+    )
+    record.ambient = wp.vec3(*scene.lighting.ambient)
+    record.sky, record.ground = wp.vec3(*scene.environment.sky), wp.vec3(*scene.environment.ground)
+    if before is not None:
+        for name in ("image_size", "image", "image_bytes"):
+            setattr(record, name, getattr(before, name))
+    else:
+        image = scene.environment_image
+        record.image_size = wp.vec2i(0, 0) if image is None else wp.vec2i(*image.shape[:2])
+        for name, kind, dtype in (("image", np.float32, wp.vec3), ("image_bytes", np.uint8, wp.vec3ub)):
+            own = image if image is not None and image.dtype == kind else np.empty((0, 0, 3), kind)
+            setattr(record, name, wp.array(own, dtype=dtype, device=device, copy=False))
+    record.decoded = decoded
+    record.shadows = int(scene.lighting.shadows)
+    return record
+
+
+def _light(light: Light, device_from_world: np.ndarray) -> LightRecord:
+    record = LightRecord()
+    record.is_point = int(light.kind == "point")
+    if light.position is not None and light.intensity is not None:
+        record.position = wp.vec3d(*(device_from_world @ [*light.position, 1.0])[:3])
+        device_units_per_world_unit = float(device_from_world[0, 0])
+        intensity = np.asarray(light.intensity) * device_units_per_world_unit**2
+        record.radiance = wp.vec3(*np.minimum(intensity, BRIGHTEST))
+    elif light.direction is not None and light.radiance is not None:
+        towards = -np.asarray(light.direction, float)
+        record.towards = wp.vec3(*(towards / np.linalg.norm(towards)))
+        record.radiance = wp.vec3(*light.radiance)
+    return record

@@ -1,0 +1,69 @@
+"""What kernels read of a scene: an object, a light, and all lights with the environment.
+
+Three spaces. *World*: the scene file's. *Device*: the world moved and scaled alike along all axes
+(``device_space.py``); all rays and positions in kernels are in it. Positions in it are float64, distances and
+directions float32. *Unit*: an object's own vertices with their bounding box's longest side from -1 to 1, where float32
+holds at any scale and offset.
+"""
+
+from __future__ import annotations
+
+import warp as wp
+
+
+@wp.struct
+class ObjectRecord:
+    """An object: its mesh, place and material."""
+
+    vertices: wp.array(dtype=wp.vec3)  # unit space
+    exact_vertices: wp.array(dtype=wp.vec3d)  # the same in float64 if some lie far outside the bulk, else empty
+    normals: wp.array(dtype=wp.vec3)  # unit space, not always of unit length, zero where undefined
+    uvs: wp.array(dtype=wp.vec2)  # empty without texture coordinates
+    faces: wp.array(dtype=wp.vec3i)
+    device_from_unit: wp.mat44d
+    unit_from_device: wp.mat44d
+    unit_from_direction: wp.mat33  # the linear part of unit_from_device, over unit_per_device
+    unit_per_device: float  # a power of two, so that squares stay in float32's range however small the object is
+    normal_from_unit: wp.mat33  # inverse transpose of device_from_unit's linear part
+    centre: wp.vec3  # bounding sphere, device space
+    radius: float
+    first_triangle: int  # number of triangle 0 among all objects' triangles
+    first_vertex: int  # and of vertex 0 among all objects' vertices
+    triangle_count: int
+    smooth: int
+    fresnel: int
+    albedo: wp.vec3
+    emission: wp.vec3
+    mirror: wp.vec3
+    part_first: wp.array(dtype=wp.int32)  # first triangle of each part
+    part_color: wp.array(dtype=wp.vec3)
+    part_texture: wp.array(dtype=wp.vec4i)  # first texel, width, height, 1 for bytes; width 0 without a texture
+    texels: wp.array(dtype=wp.vec3)  # all parts' textures of floats, row 0 at v = 1
+    texel_bytes: wp.array(dtype=wp.vec3ub)  # and those of 8 bits, sRGB
+    decoded: wp.array(dtype=float)  # the linear value of every byte
+
+
+@wp.struct
+class LightRecord:
+    """A light in device space."""
+
+    is_point: int
+    towards: wp.vec3  # of a directional one, unit
+    position: wp.vec3d  # of a point light
+    radiance: wp.vec3  # point: intensity in device units
+
+
+@wp.struct
+class LightingRecord:
+    """Lights and environment."""
+
+    lights: wp.array(dtype=LightRecord)
+    ambient: wp.vec3
+    sky: wp.vec3
+    ground: wp.vec3
+    up: wp.vec3  # unit
+    image_size: wp.vec2i  # rows and columns of the equirectangular picture; 0 without one
+    image: wp.array2d(dtype=wp.vec3)  # its pixels if they are floats
+    image_bytes: wp.array2d(dtype=wp.vec3ub)  # and if they have 8 bits, sRGB; the other one is empty
+    decoded: wp.array(dtype=float)  # the linear value of every byte
+    shadows: int
