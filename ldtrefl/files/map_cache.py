@@ -20,7 +20,7 @@ import logging
 import mmap
 import os
 import struct
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -30,6 +30,7 @@ import platformdirs
 import xxhash
 
 from ldtrefl.base.errors import InputError
+from ldtrefl.files.content_key import content_key
 from ldtrefl.files.whole import changed_by_others, open_plain, private_folder, written_whole
 
 FORMAT = 2
@@ -57,13 +58,9 @@ class Entry:
     """What JSON can hold."""
 
 
-def key_of(arrays: Iterable[np.ndarray], options: dict[str, Any]) -> str:
-    """A name for what is made from these arrays with these options: 32 hexadecimal digits."""
-    digest = xxhash.xxh3_128(json.dumps([FORMAT, options], sort_keys=True).encode())
-    for array in arrays:
-        digest.update(f"{array.dtype.str}{array.shape}".encode())
-        digest.update(np.ascontiguousarray(array).data)
-    return digest.hexdigest()
+def key_of(made_from: str, options: dict[str, Any]) -> str:
+    """A name for what is made with these options from what has the key ``made_from``: 32 hexadecimal digits."""
+    return content_key(json.dumps([FORMAT, made_from, options], sort_keys=True))
 
 
 class MapCache:

@@ -3,8 +3,8 @@
 In memory an image is ``(height, width, 3)`` float32, linear radiance, row 0 at the top. Files are read and written by
 OpenImageIO, a few rows at a time.
 
-A *stored* picture is what textures and environments are kept as, and its type says how it is encoded: ``uint8`` is
-sRGB, ``float32`` is linear. Pictures of 8 bits stay as they are, 3 bytes a pixel; all others take 12 bytes a pixel.
+A *stored* picture (``files/stored_picture.py``) is what textures and environments are kept as: pictures of 8 bits stay
+as they are, sRGB, 3 bytes a pixel; all others become linear floats, 12 bytes a pixel.
 
 What a file means by its numbers:
 
@@ -33,6 +33,7 @@ from ldtrefl.base import budget
 from ldtrefl.base.errors import InputError
 from ldtrefl.base.standard_error import caught_stderr
 from ldtrefl.files.pillow_limit import format_and_size
+from ldtrefl.files.stored_picture import StoredPicture
 from ldtrefl.files.whole import replaceable, writable_folder, written_whole
 
 WRITABLE = (".png", ".exr")
@@ -90,8 +91,8 @@ def load_image(path: str | Path) -> np.ndarray:
     return decoded_bytes()[stored]
 
 
-def stored_picture(path: str | Path) -> np.ndarray:
-    """Read a picture as it is stored: ``(h, w, 3)`` uint8, sRGB, or float32, linear. It is not to be changed.
+def stored_picture(path: str | Path) -> StoredPicture:
+    """Read a picture as it is stored.
 
     A file is read once while anybody holds its picture, and again only when it has changed.
 
@@ -102,17 +103,15 @@ def stored_picture(path: str | Path) -> np.ndarray:
     try:
         status = path.stat()
     except (OSError, ValueError):
-        return _read(path)
+        return StoredPicture(_read(path))
     key = (str(path.resolve()), status.st_mtime_ns, status.st_size)
     picture = _pictures.get(key)
     if picture is None:
-        picture = _read(path)
-        picture.flags.writeable = False
-        _pictures[key] = picture
+        picture = _pictures[key] = StoredPicture(_read(path))
     return picture
 
 
-_pictures: weakref.WeakValueDictionary[tuple[str, int, int], np.ndarray] = weakref.WeakValueDictionary()
+_pictures: weakref.WeakValueDictionary[tuple[str, int, int], StoredPicture] = weakref.WeakValueDictionary()
 
 
 def _read(path: Path) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Pictures that the readers of mesh files hand over, as Pillow opened them -> stored pictures (``image.py``)."""
+"""Pictures that the readers of mesh files hand over, as Pillow opened them, made stored pictures."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ import weakref
 from typing import Any
 
 import numpy as np
-import xxhash
 from PIL import Image
 
 from ldtrefl.base import budget
 from ldtrefl.base.errors import InputError
 from ldtrefl.files.pictures import linear_from_srgb
+from ldtrefl.files.stored_picture import StoredPicture
 
 BYTES_A_PIXEL = 4 + 4 + 3
 """What Pillow takes to unpack a picture, what trimesh does to copy it, and what is kept of it."""
 
 ROWS_AT_ONCE = 256
 
-_by_content: weakref.WeakValueDictionary[bytes, np.ndarray] = weakref.WeakValueDictionary()
+_by_content: weakref.WeakValueDictionary[str, StoredPicture] = weakref.WeakValueDictionary()
 
 
 def picture_of(material: Any) -> Image.Image | None:
@@ -39,10 +39,10 @@ def take_pictures(materials: list[Any]) -> None:
             budget.take(width * height * BYTES_A_PIXEL, what, "a smaller texture")
 
 
-def stored_from_pillow(picture: Image.Image) -> np.ndarray:
-    """``(h, w, 3)`` uint8, sRGB, or float32, linear, of pictures of more than 8 bits. It is not to be changed.
+def stored_from_pillow(picture: Image.Image) -> StoredPicture:
+    """A stored picture: uint8, or float32 of pictures of more than 8 bits.
 
-    Alpha is left out, and colours are not multiplied by it. Pictures that are the same share one array.
+    Alpha is left out, and colours are not multiplied by it. For pictures that are the same, the same one is returned.
 
     Raises:
         InputError: the picture is cut off or damaged.
@@ -60,6 +60,5 @@ def stored_from_pillow(picture: Image.Image) -> np.ndarray:
                 into[:] = np.asarray(rows.convert("RGBA" if "transparency" in picture.info else "RGB"))[..., :3]
     except Exception as error:  # whatever a damaged picture provokes in a reader is the picture's fault
         raise InputError(f"a texture is cut off or damaged ({error})") from error
-    stored.flags.writeable = False
-    key = xxhash.xxh3_128_digest(f"{stored.dtype} {stored.shape}".encode() + xxhash.xxh3_128_digest(stored.data))
-    return _by_content.setdefault(key, stored)
+    made = StoredPicture(stored)
+    return _by_content.setdefault(made.key, made)

@@ -164,7 +164,7 @@ class LayeredDepthTexture:
         if cache is None or len(mesh.faces) < WORTH_KEEPING:
             return make()
         options = {"kind": kind, "resolution": self.resolution, "quality": self.quality, "trusted": self.trusted}
-        key = key_of([mesh.vertices, mesh.faces], {**options, "algorithm": fingerprint("ldt.texture")})
+        key = key_of(mesh.surface_key, {**options, "algorithm": fingerprint("ldt.texture")})
         kept = cache.load(key, read)
         self.from_cache = kept is not None
         if kept is not None:

@@ -41,6 +41,7 @@ from ldtrefl.base.checked import (
 )
 from ldtrefl.base.errors import InputError, first_fault, printable, unknown_name
 from ldtrefl.files.pictures import stored_picture
+from ldtrefl.files.stored_picture import StoredPicture
 from ldtrefl.scene import shapes
 from ldtrefl.scene.mesh import Mesh
 from ldtrefl.scene.readers.mesh_files import load_mesh
@@ -90,6 +91,11 @@ class Environment:
     sky: Color = (0.55, 0.70, 0.95)
     ground: Color = (0.30, 0.28, 0.25)
     image: Text | None = None
+
+    @functools.cached_property
+    def picture(self) -> StoredPicture | None:
+        """The picture that ``image`` names, read when it is first asked for; None without one."""
+        return None if self.image is None else stored_picture(self.image)
 
 
 @refusing_in_one_line
@@ -156,6 +162,11 @@ class Material:
             object.__setattr__(self, "albedo", _Unstated((0.0 if any(self.mirror) else 0.8,) * 3))
         return self
 
+    @functools.cached_property
+    def picture(self) -> StoredPicture | None:
+        """The picture that ``texture`` names, read when it is first asked for; None without one."""
+        return None if self.texture is None else stored_picture(self.texture)
+
     @property
     def excess(self) -> tuple[float, str] | None:
         """The largest sum of albedo and mirror in a channel, and the channel, where it is above 1; else None."""
@@ -212,10 +223,10 @@ class Object:
             return shapes.make(self.shape, self.params)
         return self.mesh if isinstance(self.mesh, Mesh) else load_mesh(str(self.mesh))
 
-    @functools.cached_property
-    def texture(self) -> np.ndarray | None:
-        """``material.texture``: (h, w, 3) as it is stored, uint8, sRGB, or float32, linear; None without one."""
-        return None if self.material.texture is None else stored_picture(self.material.texture)
+    @property
+    def texture(self) -> StoredPicture | None:
+        """The picture that ``material.texture`` names; None without one."""
+        return self.material.picture
 
     @property
     def is_reflector(self) -> bool:
@@ -344,10 +355,10 @@ class Scene:
             changed.__dict__["geometry"] = self.objects[number].geometry  # not made again
         return dataclasses.replace(self, objects=(*self.objects[:number], changed, *self.objects[number + 1 :]))
 
-    @functools.cached_property
-    def environment_image(self) -> np.ndarray | None:
-        """``environment.image``: (h, w, 3) as it is stored, uint8, sRGB, or float32, linear; None without one."""
-        return None if self.environment.image is None else stored_picture(self.environment.image)
+    @property
+    def environment_image(self) -> StoredPicture | None:
+        """The picture that ``environment.image`` names; None without one."""
+        return self.environment.picture
 
 
 _ADAPTER = TypeAdapter(Scene)
@@ -389,7 +400,6 @@ def _found(scene: Scene, path: Path) -> Scene:
     """The scene with every file found and read; a fault names the key."""
     objects = []
     meshes: dict[tuple[str | None, str, str], Mesh] = {}
-    textures: dict[str | None, np.ndarray | None] = {None: None}
     for index, entry in enumerate(scene.objects):
         key = f"object[{index}]"
         mesh = entry.mesh
@@ -405,9 +415,7 @@ def _found(scene: Scene, path: Path) -> Scene:
         if source in meshes:
             placed.__dict__["geometry"] = meshes[source]
         meshes[source] = _read(path, f"{key}.{'mesh' if entry.shape is None else 'shape'}", placed, "geometry")
-        if material.texture in textures:
-            placed.__dict__["texture"] = textures[material.texture]
-        textures[material.texture] = _read(path, f"{key}.material.texture", placed, "texture")
+        _read(path, f"{key}.material.texture", placed, "texture")
         if placed.material.texture is not None and placed.geometry.uvs is None:
             raise InputError(f"{path}: {key}.material.texture: the object has no texture coordinates (UVs)")
         _read(path, key, placed, "_world_from_object")

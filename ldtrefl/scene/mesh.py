@@ -7,12 +7,15 @@ triangle's number means the same to the mesh, the ray caster and the layered dep
 from __future__ import annotations
 
 import functools
+import json
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ldtrefl.base.errors import InputError
+from ldtrefl.files.content_key import content_key
+from ldtrefl.files.stored_picture import StoredPicture
 from ldtrefl.scene.bulk import split_outliers
 from ldtrefl.scene.mesh_passes import copied_faces, copied_vertices, fitted_vertices, is_constant
 from ldtrefl.scene.normals import vertex_normals
@@ -31,8 +34,13 @@ class Part:
     first_triangle: int = 0
     color: tuple[float, float, float] = (1.0, 1.0, 1.0)
     """Linear base colour, times the scene's albedo."""
-    texture: np.ndarray | None = None
-    """``(h, w, 3)`` uint8, sRGB, or float32, linear, row 0 at v = 1; None without one. It is not to be changed."""
+    texture: StoredPicture | None = None
+
+    @property
+    def key(self) -> str:
+        """A hash of all that it holds: parts with the same key are the same."""
+        texture = None if self.texture is None else self.texture.key
+        return content_key(json.dumps([self.first_triangle, *map(float, self.color)]), texture)
 
 
 class Mesh:
@@ -47,10 +55,10 @@ class Mesh:
 
     def __init__(
         self,
-        vertices: Any,
-        faces: Any,
-        normals: Any = None,
-        uvs: Any = None,
+        vertices: ArrayLike,
+        faces: ArrayLike,
+        normals: ArrayLike | None = None,
+        uvs: ArrayLike | None = None,
         parts: tuple[Part, ...] = (Part(),),
     ) -> None:
         given, corners = _coordinates(vertices), _indices(faces)
@@ -70,21 +78,51 @@ class Mesh:
         out)."""
         if wrong is not None:
             raise InputError(f"vertex {wrong} is not finite or too large: {given[wrong].tolist()}")
-        if normals is not None:
-            self.normals = _array(normals, np.float32, 3, "normals")
-        self.uvs = None if uvs is None else _array(uvs, np.float32, 2, "uvs")
-        """(n, 2) float32 texture coordinates, v = 0 at the bottom row."""
+        self.stored_normals = self._of_vertices(normals, 3, "normals")
+        """(n, 3) float32 shading normals, None if none were given."""
+        self.uvs = self._of_vertices(uvs, 2, "uvs")
+        """(n, 2) float32 texture coordinates, v = 0 at the bottom row; None if none were given."""
         self.parts = parts
-        for name, values in (("normals", None if normals is None else self.normals), ("uvs", self.uvs)):
-            if values is not None and len(values) != len(self.vertices):
-                raise InputError(f"{len(values)} {name} for {len(self.vertices)} vertices")
         for array in (self.vertices, self.faces, self.is_used, self.bounds):
             array.flags.writeable = False
 
+    def _of_vertices(self, values: ArrayLike | None, width: int, name: str) -> np.ndarray | None:
+        """Checked values of the vertices, (n, width) float32; None if none are given."""
+        if values is None:
+            return None
+        array = _array(values, np.float32, width, name)
+        if len(array) != len(self.vertices):
+            raise InputError(f"{len(array)} {name} for {len(self.vertices)} vertices")
+        return array
+
+    def with_normals(self, normals: ArrayLike) -> Mesh:
+        """The same mesh with these shading normals, (n, 3). All its other arrays are shared.
+
+        Raises:
+            InputError: there are more or fewer normals than vertices.
+        """
+        mesh = Mesh.__new__(Mesh)
+        for name in ("vertices", "faces", "is_used", "bounds", "uvs", "parts"):
+            setattr(mesh, name, getattr(self, name))
+        mesh.stored_normals = mesh._of_vertices(normals, 3, "normals")
+        return mesh
+
     @functools.cached_property
     def normals(self) -> np.ndarray:
-        """(n, 3) float32 shading normals; made from the faces, when they are first asked for, if none were given."""
+        """(n, 3) float32 shading normals: those given, or else made from the faces when they are first asked for."""
+        if self.stored_normals is not None:
+            return self.stored_normals
         return _read_only(vertex_normals(self.vertices, self.faces))
+
+    @functools.cached_property
+    def surface_key(self) -> str:
+        """A hash of the vertices and faces, which are all that rays meet. Made when it is first asked for."""
+        return content_key(self.vertices, self.faces)
+
+    @functools.cached_property
+    def key(self) -> str:
+        """A hash of all that was given: meshes with the same key are the same. Made when it is first asked for."""
+        return content_key(self.surface_key, self.stored_normals, self.uvs, *(part.key for part in self.parts))
 
     @functools.cached_property
     def _split(self) -> tuple[np.ndarray, np.ndarray]:
@@ -119,7 +157,7 @@ def _read_only(array: np.ndarray) -> np.ndarray:
     return array
 
 
-def _array(values: Any, dtype: type, width: int, name: str) -> np.ndarray:
+def _array(values: ArrayLike, dtype: type, width: int, name: str) -> np.ndarray:
     """(n, width) read-only: the values themselves if nobody changes them, or else a copy."""
     if isinstance(values, np.ndarray) and is_constant(values, dtype):
         return _shaped(np.asarray(values), width, name)
@@ -141,14 +179,14 @@ def _is_one_of(array: np.ndarray, *dtypes: type) -> bool:
     return array.dtype in dtypes and array.flags.aligned
 
 
-def _coordinates(values: Any) -> np.ndarray:
+def _coordinates(values: ArrayLike) -> np.ndarray:
     """(n, 3) float32 or float64, not copied if it is that."""
     if isinstance(values, np.ndarray) and _is_one_of(values, np.float32, np.float64):
         return _shaped(np.asarray(values), 3, "vertices")
     return _array(values, np.float64, 3, "vertices")
 
 
-def _indices(values: Any) -> np.ndarray:
+def _indices(values: ArrayLike) -> np.ndarray:
     """(m, 3) int32 or int64, not copied if it is that."""
     try:
         array = np.asarray(values)

@@ -8,6 +8,7 @@ import numpy as np
 import warp as wp
 
 from ldtrefl.base.errors import InputError
+from ldtrefl.files.stored_picture import StoredPicture
 from ldtrefl.scene.mesh import Mesh
 
 
@@ -27,25 +28,27 @@ class Appearance:
         return bool(self.texels.shape[0] + self.texel_bytes.shape[0] > 0)
 
 
-def appearance_of(mesh: Mesh, texture: np.ndarray | None, device: wp.Device) -> Appearance:
-    """Upload the colours and textures of a mesh's parts. ``texture``, (h, w, 3), takes the place of all parts' own
-    textures if it is given.
+def appearance_of(mesh: Mesh, texture: StoredPicture | None, device: wp.Device) -> Appearance:
+    """Upload the colours and textures of a mesh's parts; a texture of several parts is uploaded once.
+
+    ``texture`` takes the place of all parts' own textures if it is given.
 
     Raises:
         InputError: there is a texture, and the mesh has no texture coordinates; or the textures have too many texels.
     """
     textures = [part.texture if texture is None else texture for part in mesh.parts]
     pools: dict[type, list[np.ndarray]] = {np.float32: [], np.uint8: []}
-    places: dict[int, tuple[int, int, int, int]] = {}
+    places: dict[str, tuple[int, int, int, int]] = {}
     for picture in textures:
-        if picture is not None and id(picture) not in places:
-            kind = np.uint8 if picture.dtype == np.uint8 else np.float32
+        if picture is not None and picture.key not in places:
+            pixels = picture.pixels
+            kind = np.uint8 if pixels.dtype == np.uint8 else np.float32
             first = sum(len(pool) for pool in pools[kind])
-            places[id(picture)] = (first, picture.shape[1], picture.shape[0], int(kind is np.uint8))
-            pools[kind].append(np.ascontiguousarray(picture, kind).reshape(-1, 3))
+            places[picture.key] = (first, pixels.shape[1], pixels.shape[0], int(kind is np.uint8))
+            pools[kind].append(np.ascontiguousarray(pixels, kind).reshape(-1, 3))
     if places and mesh.uvs is None:
         raise InputError("material.texture: the object has no texture coordinates (UVs)")
-    table = [(0, 0, 0, 0) if picture is None else places[id(picture)] for picture in textures]
+    table = [(0, 0, 0, 0) if picture is None else places[picture.key] for picture in textures]
     return Appearance(
         wp.array([p.first_triangle for p in mesh.parts], dtype=wp.int32, device=device),
         wp.array([p.color for p in mesh.parts], dtype=wp.vec3, device=device),

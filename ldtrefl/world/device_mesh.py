@@ -8,6 +8,7 @@ import numpy as np
 import warp as wp
 
 from ldtrefl.device import warp_abi
+from ldtrefl.files.stored_picture import StoredPicture
 from ldtrefl.scene.mesh import Mesh
 from ldtrefl.world.appearance import Appearance, appearance_of
 from ldtrefl.world.outliers import Outliers, outliers_of
@@ -23,8 +24,8 @@ class DeviceMesh:
         self.faces = wp.array(mesh.faces, dtype=wp.vec3i, device=device, copy=False)
         self.attribute_bytes = 0
         """Bytes of the normals and texture coordinates that have been uploaded."""
-        self._appearances: dict[int, tuple[np.ndarray | None, Appearance]] = {}
-        """By ``id`` of the texture, which is kept beside."""
+        self._appearances: dict[str | None, Appearance] = {}
+        """By key of the texture."""
 
     @functools.cached_property
     def outliers(self) -> Outliers:
@@ -63,9 +64,10 @@ class DeviceMesh:
         """An empty array in the place of the texture coordinates, for objects whose shading reads none."""
         return wp.empty(0, dtype=wp.vec2, device=self.vertices.device)
 
-    def appearance(self, texture: np.ndarray | None) -> Appearance:
-        """The colours and textures of the mesh's parts; ``texture``, (h, w, 3), takes the place of all parts' own if it
-        is given. Objects with the same mesh and texture share one."""
-        if id(texture) not in self._appearances:
-            self._appearances[id(texture)] = texture, appearance_of(self.mesh, texture, self.vertices.device)
-        return self._appearances[id(texture)][1]
+    def appearance(self, texture: StoredPicture | None) -> Appearance:
+        """The colours and textures of the mesh's parts; ``texture`` takes the place of all parts' own if it is given.
+        Objects with the same mesh and texture share one."""
+        key = None if texture is None else texture.key
+        if key not in self._appearances:
+            self._appearances[key] = appearance_of(self.mesh, texture, self.vertices.device)
+        return self._appearances[key]

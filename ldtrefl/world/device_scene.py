@@ -80,23 +80,23 @@ class DeviceScene:
         """The objects in device space, those that stand where they stood taken over."""
         former = [] if before is None else before.objects
         same_space = before is not None and np.array_equal(self.device_from_world, before.device_from_world)
-        meshes = {id(entry.geometry.mesh): entry.geometry for entry in former}
+        meshes = {entry.geometry.mesh.key: entry.geometry for entry in former}
         placed: list[DeviceObject] = []
         first_triangle = first_vertex = 0
         for index, source in enumerate(self.scene.objects):
-            mesh = source.geometry
-            if id(mesh) not in meshes:
-                meshes[id(mesh)] = DeviceMesh(mesh, self.device)
+            key = source.geometry.key
+            if key not in meshes:
+                meshes[key] = DeviceMesh(source.geometry, self.device)
+            geometry = meshes[key]
             if same_space and former[index].source is source:
                 placed.append(former[index])
             else:
-                geometry, record = meshes[id(mesh)], ObjectRecord()
-                matrix = world_from_unit(source, mesh)
+                record, matrix = ObjectRecord(), world_from_unit(source, geometry.mesh)
                 set_geometry(record, geometry, self.device_from_world @ matrix, first_triangle, first_vertex)
                 set_material(record, source, geometry, self._decoded, skip_attributes=self._skip_attributes)
                 placed.append(DeviceObject(index, source, geometry, matrix, record))
-            first_triangle += len(mesh.faces)
-            first_vertex += len(mesh.vertices)
+            first_triangle += len(geometry.mesh.faces)
+            first_vertex += len(geometry.mesh.vertices)
         return placed
 
     @functools.cached_property

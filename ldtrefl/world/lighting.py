@@ -33,7 +33,7 @@ def lighting_of(
         for name in ("image_size", "image", "image_bytes"):
             setattr(record, name, getattr(before, name))
     else:
-        image = scene.environment_image
+        image = None if scene.environment_image is None else scene.environment_image.pixels
         record.image_size = wp.vec2i(0, 0) if image is None else wp.vec2i(*image.shape[:2])
         for name, kind, dtype in (("image", np.float32, wp.vec3), ("image_bytes", np.uint8, wp.vec3ub)):
             own = image if image is not None and image.dtype == kind else np.empty((0, 0, 3), kind)

@@ -126,10 +126,9 @@ def test_two_processes_write_at_once(tmp_path: Path) -> None:
     assert cache.load("b" * 32) is not None and len(list(tmp_path.iterdir())) == 1
 
 
-def test_keys_tell_arrays_and_options_apart() -> None:
-    a, b = np.arange(6.0), np.arange(6.0).reshape(2, 3)
-    keys = {key_of([a], {}), key_of([b], {}), key_of([a, a], {}), key_of([a], {"r": 1}), key_of([a + 1e-12], {})}
-    assert len(keys) == 5 and key_of([a.copy()], {}) in keys
+def test_keys_tell_meshes_and_options_apart() -> None:
+    keys = {key_of("a", {}), key_of("b", {}), key_of("a", {"r": 1}), key_of("a", {"r": 2})}
+    assert len(keys) == 4 and key_of("a", {"r": 1}) in keys
 
 
 def test_command_line(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

@@ -19,6 +19,7 @@ from ldtrefl import InputError, load_image
 from ldtrefl.base import budget
 from ldtrefl.files.pictures import linear_from_srgb, stored_picture
 from ldtrefl.files.pillow_pictures import stored_from_pillow
+from ldtrefl.files.stored_picture import StoredPicture
 from ldtrefl.scene import shapes
 from ldtrefl.scene.description import Camera, Environment, Material, Object, Scene
 from ldtrefl.scene.mesh import Mesh, Part
@@ -99,7 +100,7 @@ def test_integers_are_encoded_and_not_multiplied_by_alpha(tmp_path: Path, name: 
     exact = {"lossless": True, "exact": True} if name.endswith("webp") else {}
     Image.new(mode, (6, 4), color).save(tmp_path / name, **exact)
     truth = np.asarray(Image.open(tmp_path / name).convert("RGB"))
-    stored = stored_picture(tmp_path / name)
+    stored = stored_picture(tmp_path / name).pixels
     assert stored.dtype == np.uint8
     np.testing.assert_array_equal(stored, truth)
     np.testing.assert_allclose(load_image(tmp_path / name), linear_from_srgb(truth / 255), atol=1e-6)
@@ -111,7 +112,9 @@ def test_a_palette_with_clear_colors(tmp_path: Path) -> None:
     picture = Image.new("P", (6, 4))
     picture.putpalette([*COLOR, *(0, 0, 0) * 255])
     picture.save(tmp_path / "a.png", transparency=bytes([128] * 256))
-    np.testing.assert_array_equal(stored_picture(tmp_path / "a.png"), np.broadcast_to(np.uint8(COLOR), (4, 6, 3)))
+    np.testing.assert_array_equal(
+        stored_picture(tmp_path / "a.png").pixels, np.broadcast_to(np.uint8(COLOR), (4, 6, 3))
+    )
 
 
 @pytest.mark.parametrize("name", ["grey.png", "rgb.png", "rgb.tif"])
@@ -195,17 +198,17 @@ def test_a_picture_stands_as_it_is_stored(tmp_path: Path) -> None:
 def test_stored_pictures_are_shared_and_loaded_images_are_not(tmp_path: Path) -> None:
     path = write(tmp_path / "a.exr", np.full((4, 6, 3), 0.5), oiio.FLOAT)
     first = stored_picture(path)
-    assert stored_picture(path) is first and not first.flags.writeable
+    assert stored_picture(path) is first and not first.pixels.flags.writeable
     load_image(path)[:] = 7.0
     np.testing.assert_array_equal(load_image(path), np.full((4, 6, 3), 0.5, np.float32))
     write(path, np.full((5, 6, 3), 0.25), oiio.FLOAT)
-    assert stored_picture(path).shape == (5, 6, 3)
+    assert stored_picture(path).pixels.shape == (5, 6, 3)
 
 
 def scene_of(texture: np.ndarray, environment: str) -> Scene:
     """A textured plane before a mirror ball under an environment's picture."""
     plane = shapes.make("plane", {})
-    mesh = Mesh(plane.vertices, plane.faces, None, plane.uvs, (Part(0, (1.0, 1.0, 1.0), texture),))
+    mesh = Mesh(plane.vertices, plane.faces, None, plane.uvs, (Part(0, (1.0, 1.0, 1.0), StoredPicture(texture)),))
     return Scene(
         camera=Camera(eye=(0, -5, 2), look_at=(0, 0, 0), width=48, height=32),
         environment=Environment(image=environment),
@@ -232,7 +235,7 @@ def test_large_pictures_are_asked_for_first(tmp_path: Path, small_limit: int) ->
     with pytest.raises(InputError, match=r"a\.png: a picture of 600 x 600 pixels needs 1\.0 MiB, allowed are 1\.0 MiB"):
         stored_picture(path)
     path = large_png(tmp_path / "b.png", 400)
-    assert stored_picture(path).shape == (400, 400, 3)
+    assert stored_picture(path).pixels.shape == (400, 400, 3)
     with pytest.raises(InputError, match=r"as floats a picture of 400 x 400 pixels needs 1\.8 MiB"):
         load_image(path)
 
@@ -255,7 +258,7 @@ from pathlib import Path
 from ldtrefl.files.pictures import stored_picture
 peak = lambda: int(Path("/proc/self/status").read_text().split("VmHWM:")[1].split()[0]) << 10
 own = peak()
-picture = stored_picture(sys.argv[1])
+picture = stored_picture(sys.argv[1]).pixels
 print((peak() - own) / (picture.shape[0] * picture.shape[1]))
 """
 
@@ -284,9 +287,9 @@ def test_textures_of_a_glb(tmp_path: Path, mode: str, monkeypatch: pytest.Monkey
     write_glb(tmp_path / "a.glb", picture)
     monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 100)
     texture = ldtrefl.load_mesh(tmp_path / "a.glb").parts[0].texture
-    assert texture is not None and texture.dtype == np.uint8
+    assert texture is not None and texture.pixels.dtype == np.uint8
     monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", None)
-    np.testing.assert_array_equal(texture, np.asarray(picture.convert("RGB")))
+    np.testing.assert_array_equal(texture.pixels, np.asarray(picture.convert("RGB")))
     assert Image.MAX_IMAGE_PIXELS is None
 
 
@@ -294,8 +297,8 @@ def test_sixteen_bits_of_a_mesh_are_scaled_and_the_same_picture_is_one(tmp_path:
     values = np.arange(24, dtype=np.uint16).reshape(4, 6) * 2700 + 11
     Image.fromarray(values).save(tmp_path / "a.png")
     read = [stored_from_pillow(Image.open(tmp_path / "a.png")) for _ in range(2)]
-    assert read[0] is read[1] and not read[0].flags.writeable
-    np.testing.assert_array_equal(read[0], load_image(tmp_path / "a.png"))
+    assert read[0] is read[1] and not read[0].pixels.flags.writeable
+    np.testing.assert_array_equal(read[0].pixels, load_image(tmp_path / "a.png"))
 
 
 def test_a_glb_of_large_textures_is_asked_for_first(tmp_path: Path, small_limit: int) -> None:

@@ -9,7 +9,10 @@ import trimesh
 from PIL import Image
 
 import ldtrefl
+from ldtrefl.files.stored_picture import StoredPicture
+from ldtrefl.scene import shapes
 from ldtrefl.scene.description import Camera, Environment, Lighting, Material, Object, Scene
+from ldtrefl.scene.mesh import Part
 from tests.conftest import REAL_MESHES
 
 
@@ -105,3 +108,30 @@ def test_parts_keep_their_own_colours_and_textures(tmp_path: Path) -> None:
     image = ldtrefl.render(Scene(camera=camera, lighting=Lighting(ambient=(1, 1, 1)), objects=(thing,))).image
     np.testing.assert_allclose(image[4, 2], [1, 0, 0], atol=1e-3)
     np.testing.assert_allclose(image[4, 13], [0, 0, 1], atol=1e-3)
+
+
+def test_the_key_of_a_mesh_is_its_content() -> None:
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], float)
+    faces, normals, uvs = [[0, 1, 2], [1, 2, 3]], np.eye(4, 3), np.eye(4, 2)
+    pixels = [np.full((2, 2, 3), value, np.uint8) for value in (1, 1, 2)]
+    red, alike, other = (Part(0, (1.0, 0.0, 0.0), StoredPicture(entry)) for entry in pixels)
+    mesh = ldtrefl.Mesh(vertices, faces, normals, uvs, (red,))
+    assert ldtrefl.Mesh(vertices.copy(), faces, normals, uvs, (alike,)).key == mesh.key
+    assert ldtrefl.Mesh(vertices, faces, None, uvs, (red,)).with_normals(normals).key == mesh.key
+    changed = [
+        ldtrefl.Mesh(vertices + 1e-9, faces, normals, uvs, (red,)),
+        ldtrefl.Mesh(vertices, faces[::-1], normals, uvs, (red,)),
+        ldtrefl.Mesh(vertices, faces, -normals, uvs, (red,)),
+        ldtrefl.Mesh(vertices, faces, None, uvs, (red,)),
+        ldtrefl.Mesh(vertices, faces, normals, 2.0 * uvs, (red,)),
+        ldtrefl.Mesh(vertices, faces, normals, uvs, (other,)),
+        ldtrefl.Mesh(vertices, faces, normals, uvs, (red, Part(1))),
+    ]
+    assert len({entry.key for entry in (mesh, *changed)}) == 8
+    assert [entry.surface_key == mesh.surface_key for entry in changed] == [False, False, True, True, True, True, True]
+
+
+def test_normals_are_one_a_vertex() -> None:
+    plane = shapes.make("plane", {})
+    with pytest.raises(ldtrefl.InputError, match=f"3 normals for {len(plane.vertices)} vertices"):
+        plane.with_normals(np.eye(3))

@@ -27,6 +27,7 @@ from ldtrefl.base.errors import InputError
 from ldtrefl.base.sharing import shared_while_used
 from ldtrefl.files.pillow_limit import no_pixel_limit
 from ldtrefl.files.pillow_pictures import picture_of, stored_from_pillow, take_pictures
+from ldtrefl.files.stored_picture import StoredPicture
 from ldtrefl.scene.mesh import Mesh, Part
 from ldtrefl.scene.normals import split_by_side
 from ldtrefl.scene.readers.archives import ARCHIVES, archive_kind, mesh_files
@@ -109,7 +110,7 @@ def _load_mesh(path: str, _modified: int, _size: int) -> Mesh:
                 asked += needed
             if not pieces:
                 raise InputError("the mesh has no triangles")
-            take_pictures(list({id(_material(piece)): _material(piece) for piece in pieces}.values()))
+            take_pictures([_material(piece) for piece in _one_of_each_material(pieces)[0]])
             # What was asked for to read the file is free again.
             budget.take(max(0.0, _joining_bytes(pieces) - asked), "its mesh")
             return _joined(pieces)
@@ -246,11 +247,11 @@ def _joined(pieces: list[_Piece]) -> Mesh:
     if len(pieces) > 1:
         faces = faces + np.repeat(first_vertex[:-1], np.diff(first_triangle))[:, None]
     uvs = _joined_uvs(pieces)
-    looks = {id(_material(piece)): piece for piece in pieces}  # a material of many pieces is looked at once
-    found = {key: _look(piece) for key, piece in looks.items()}
+    examples, numbers = _one_of_each_material(pieces)
+    looks = [_look(example) for example in examples]
     parts = []
-    for first, piece in zip(first_triangle, pieces, strict=False):
-        color, texture = found[id(_material(piece))]
+    for first, piece, number in zip(first_triangle[:-1], pieces, numbers, strict=True):
+        color, texture = looks[number]
         parts.append(Part(first, color, texture if _uvs(piece) is not None else None))
     mesh = Mesh(vertices, faces, None, uvs, tuple(parts))
     return _with_normals(mesh, pieces, first_vertex, first_triangle)
@@ -261,9 +262,9 @@ def _with_normals(mesh: Mesh, pieces: list[_Piece], first_vertex: np.ndarray, fi
     is_without = np.array([piece.normals is None for piece in pieces])
     stored = [np.zeros(piece.vertices.shape) if piece.normals is None else piece.normals for piece in pieces]
     normals = np.concatenate(stored).astype(np.float32)
+    normals.flags.writeable = False  # and so it is not copied
     if not is_without.any():
-        mesh.normals = normals
-        return mesh
+        return mesh.with_normals(normals)
     number = np.repeat(np.arange(len(pieces)), np.diff(first_vertex))
     triangles = np.flatnonzero(np.repeat(is_without, np.diff(first_triangle)))
     every = len(triangles) == len(mesh.faces)
@@ -272,9 +273,9 @@ def _with_normals(mesh: Mesh, pieces: list[_Piece], first_vertex: np.ndarray, fi
     )
     is_smooth = is_without[number[sources]]
     normals = np.where(is_smooth[:, None], smooth, normals[sources])
+    normals.flags.writeable = False
     if len(sources) == len(mesh.vertices):
-        mesh.normals = normals
-        return mesh
+        return mesh.with_normals(normals)
     faces = mesh.faces.copy()
     faces[triangles] = split
     return Mesh(mesh.vertices[sources], faces, normals, None if mesh.uvs is None else mesh.uvs[sources], mesh.parts)
@@ -318,6 +319,14 @@ def _material(piece: _Piece) -> Any:
     return getattr(piece.visual, "material", None)
 
 
+def _one_of_each_material(pieces: list[_Piece]) -> tuple[list[_Piece], list[int]]:
+    """(a piece of each material, for each piece the number of its material): a material of many pieces is read once."""
+    # By identity: trimesh compares materials by hashes of their unpacked pictures.
+    examples = {id(_material(piece)): piece for piece in pieces}
+    numbers = {identity: number for number, identity in enumerate(examples)}
+    return list(examples.values()), [numbers[id(_material(piece))] for piece in pieces]
+
+
 def _uvs(piece: _Piece) -> np.ndarray | None:
     uv = getattr(piece.visual, "uv", None)
     if uv is None or np.shape(uv) != (len(piece.vertices), 2) or not np.isfinite(uv).all():
@@ -325,7 +334,7 @@ def _uvs(piece: _Piece) -> np.ndarray | None:
     return np.asarray(uv, np.float32)
 
 
-def _look(piece: _Piece) -> tuple[tuple[float, float, float], np.ndarray | None]:
+def _look(piece: _Piece) -> tuple[tuple[float, float, float], StoredPicture | None]:
     """A piece's base colour, linear, and its texture as it is stored (glTF: factors are linear, textures sRGB)."""
     material = _material(piece)
     if material is None:
