@@ -27,7 +27,9 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from ldtrefl.base.budget import set_memory_limit
     from ldtrefl.base.errors import InputError
-    from ldtrefl.device.launch import Stats, progress_to, set_threads
+    from ldtrefl.device.launch import set_threads
+    from ldtrefl.device.progress import progress_to
+    from ldtrefl.device.stats import Stats
     from ldtrefl.files.map_cache import MapCache, keep_maps_in
     from ldtrefl.files.pictures import load_image, save_image
     from ldtrefl.ldt.texture import LayeredDepthTexture, peel
@@ -95,13 +97,13 @@ _HOMES = {
     "Reflection": "scene.description",
     "Renderer": "renderer",
     "Scene": "scene.description",
-    "Stats": "device.launch",
+    "Stats": "device.stats",
     "keep_maps_in": "files.map_cache",
     "load_image": "files.pictures",
     "load_mesh": "scene.readers.mesh_files",
     "load_scene": "scene.description",
     "peel": "ldt.texture",
-    "progress_to": "device.launch",
+    "progress_to": "device.progress",
     "render": "renderer",
     "save_image": "files.pictures",
     "set_memory_limit": "base.budget",

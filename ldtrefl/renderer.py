@@ -19,7 +19,7 @@ import warp as wp
 from ldtrefl.base import budget
 from ldtrefl.base.errors import InputError
 from ldtrefl.device import launch
-from ldtrefl.device.launch import Stats
+from ldtrefl.device.stats import Stats
 from ldtrefl.frame.gbuffer import BAND_PIXELS, GBuffer, draw_gbuffer, draw_in_bands
 from ldtrefl.frame.kept import KeptDrawing
 from ldtrefl.frame.reflect import FirstHits, Shaded, no_shadows, shade_gbuffer

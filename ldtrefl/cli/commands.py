@@ -28,6 +28,7 @@ from ldtrefl.base.standard_error import log_on_stderr
 from ldtrefl.compare import metrics
 from ldtrefl.compare.layer_picture import draw_layers
 from ldtrefl.device import launch
+from ldtrefl.device.progress import progress_to
 from ldtrefl.files.map_cache import MapCache, keep_maps_in
 from ldtrefl.files.pictures import check_writable, difference_image, save_image
 from ldtrefl.files.whole import writable_folder, written_whole
@@ -357,7 +358,7 @@ def _progress() -> Iterator[None]:
         progress.update(task, description=stage, completed=fraction)
 
     try:
-        with launch.progress_to(show):
+        with progress_to(show):
             yield
     finally:
         progress.stop()

@@ -1,9 +1,9 @@
-"""The only place that launches kernels: devices, slices over CPU threads, stage timers, counters, progress.
+"""The only place that launches kernels: kernels defined, the device, the number of CPU threads, launches.
 
-Warp runs a CPU launch on one thread. So every kernel here takes ``first`` as its first parameter and works on item
-``first + wp.tid()``: on the CPU a launch is cut into slices for a crew of threads (``crew.py``), on CUDA it is one
-launch with ``first = 0``. No kernel lets two items write one place unless it says how that stays the same for every
-slicing, so the bits do not depend on the number of threads.
+Warp runs a CPU launch on one thread. So every kernel of the package takes ``first`` as its first parameter and works on
+item ``first + wp.tid()``: on the CPU a launch is cut into slices for a team of threads (``cpu_threads.py``), on CUDA it
+is one launch with ``first = 0``. No kernel lets two items write one place unless it says how that stays the same for
+every slicing, so the bits do not depend on the number of threads.
 """
 
 from __future__ import annotations
@@ -12,18 +12,18 @@ import functools
 import operator
 import os
 import threading
-import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, SupportsIndex
 
 import warp as wp
 
 from ldtrefl.base.errors import InputError
-from ldtrefl.device import kernel_cache
-from ldtrefl.device.cpu_threads import Crew, alone, recorded, why_not_native
-from ldtrefl.device.python_pool import Pool
+from ldtrefl.device import kernel_cache, progress
+from ldtrefl.device.cpu_threads import ThreadTeam
+from ldtrefl.device.python_threads import PythonThreads
+from ldtrefl.device.recorded_launch import on_this_thread, record_launch
+from ldtrefl.device.thread_self_test import why_not_native
 
 REPORTS = 32
 """Times that a launch reports how far it is, if anyone wants to know."""
@@ -42,25 +42,17 @@ class _State:
     """What one process shares."""
 
     threads: int = os.cpu_count() or 1
-    crews: dict[int, Crew | Pool] = field(default_factory=dict)  # by number of threads
-    lock: threading.Lock = field(default_factory=threading.Lock)  # to make a crew
+    teams: dict[int, ThreadTeam | PythonThreads] = field(default_factory=dict)  # by number of threads
+    lock: threading.Lock = field(default_factory=threading.Lock)  # to make a team
     defining: threading.RLock = field(default_factory=threading.RLock)  # to define kernels
 
 
-class _Watch(threading.local):
-    """Who wants to know how far the launches of this thread are."""
-
-    observer: Callable[[str, float], None] | None = None
-    stage: str = ""
-
-
 _state = _State()
-_watch = _Watch()
 
 
 def _after_fork_in_child() -> None:
     # Threads do not exist in a forked process: it makes its own at its first launch.
-    _state.crews.clear()
+    _state.teams.clear()
     _state.lock = threading.Lock()
     _state.defining = threading.RLock()
 
@@ -135,16 +127,6 @@ def resolve_device(name: str | None) -> wp.Device:
         raise InputError(f"no device '{name}' (here: {known})") from error
 
 
-@contextmanager
-def progress_to(observer: Callable[[str, float], None]) -> Iterator[None]:
-    """Report the launches of this thread to ``observer(stage, fraction of the launch)`` inside this block."""
-    before, _watch.observer = _watch.observer, observer
-    try:
-        yield
-    finally:
-        _watch.observer = before
-
-
 def launch(kernel: wp.Kernel, count: int, arguments: Sequence[Any], device: wp.Device) -> None:
     """Run ``kernel(first, *arguments)`` for ``count`` items, on the CPU in slices over the threads.
 
@@ -160,14 +142,14 @@ def launch(kernel: wp.Kernel, count: int, arguments: Sequence[Any], device: wp.D
         wp.launch(kernel, dim=count, inputs=[0, *arguments], device=device)
         return
     if _state.threads == 1:
-        run = alone(recorded(kernel, count, arguments, device))
+        run = on_this_thread(record_launch(kernel, count, arguments, device))
     else:
-        run = _crew().prepared(kernel, count, arguments, device)
-    reports = 1 if _watch.observer is None else min(count, REPORTS)
+        run = _team().prepare(kernel, count, arguments, device)
+    reports = min(count, REPORTS) if progress.is_watched() else 1
     for k in range(reports):
         first, end = (count * part // reports for part in (k, k + 1))
         run(first, end - first)
-        _report(end / count)
+        progress.report(end / count)
 
 
 def launch_in_order(kernel: wp.Kernel, count: int, arguments: Sequence[Any], device: wp.Device) -> None:
@@ -189,44 +171,14 @@ def _check_count(count: int) -> None:
         )
 
 
-def _crew() -> Crew | Pool:
+def _team() -> ThreadTeam | PythonThreads:
+    """The threads that share launches: one team for each number of threads, made at the first launch of that many."""
     threads = _state.threads
-    crew = _state.crews.get(threads)
-    if crew is None:
+    team = _state.teams.get(threads)
+    if team is None:
         with _state.lock:
-            crew = _state.crews.get(threads)
-            if crew is None:
-                crew = Pool(threads) if why_not_native() else Crew(threads)
-                _state.crews[threads] = crew
-    return crew
-
-
-def _report(fraction: float) -> None:
-    if _watch.observer is not None:
-        _watch.observer(_watch.stage, fraction)
-
-
-@dataclass
-class Stats:
-    """What a frame cost: seconds per stage, and counts of what was done and what was skipped."""
-
-    seconds: dict[str, float] = field(default_factory=dict)
-    counters: dict[str, int] = field(default_factory=dict)
-
-    @contextmanager
-    def stage(self, name: str, device: wp.Device) -> Iterator[None]:
-        """Add the time of this block to ``seconds[name]``, the device's work included."""
-        outer, _watch.stage = _watch.stage, name
-        _report(0.0)
-        start = time.perf_counter()
-        try:
-            yield
-            if device.is_cuda:
-                wp.synchronize_device(device)
-        finally:
-            self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
-            _watch.stage = outer
-
-    def count(self, name: str, amount: int) -> None:
-        """Add ``amount`` to ``counters[name]``."""
-        self.counters[name] = self.counters.get(name, 0) + int(amount)
+            team = _state.teams.get(threads)
+            if team is None:
+                team = PythonThreads(threads) if why_not_native() else ThreadTeam(threads)
+                _state.teams[threads] = team
+    return team

@@ -1,9 +1,10 @@
 """All that is private to Warp, in one place.
 
-Warp promises nothing about what stands here, and it may differ in its next version. So everything is guarded:
+Warp promises nothing about what stands here, and its next version may differ. So everything is guarded.
 ``unknown_layout`` says, before any native code is called, what is not as it was in the versions that this was written
-for (1.18 and 1.19 agree); ``crew.py`` then tries a small kernel and compares, and launches by Warp's public functions
-if anything is amiss. The other functions have a slower public way, or an answer that means "not known".
+for (1.18 and 1.19 agree). ``thread_self_test.py`` then runs a small kernel and compares. If anything is amiss, launches
+go by Warp's public functions (``python_threads.py``). The other functions have a slower public way, or an answer that
+means "not known".
 """
 
 from __future__ import annotations

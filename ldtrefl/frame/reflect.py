@@ -18,6 +18,7 @@ import numpy as np
 import warp as wp
 
 from ldtrefl.device import launch
+from ldtrefl.device.stats import Stats
 from ldtrefl.frame.gbuffer import BLOCK, GBuffer, GBufferView, pixel_surface, pixel_view
 from ldtrefl.frame.kept import Followed, changed_runs, put_hits, rays_of_runs
 from ldtrefl.frame.regions import Culled
@@ -458,7 +459,7 @@ def follow_rays(
     bind: Callable[[set[int]], BoundTracer],
     max_bounces: int,
     skips: Skips,
-    stats: launch.Stats,
+    stats: Stats,
     before: Followed | None = None,
     moved: Set[int] = frozenset(),
 ) -> tuple[Followed, FirstHits]:
@@ -528,7 +529,7 @@ def _bounce(
     radiance: wp.array,
     is_last: bool,
     skips: Skips,
-    stats: launch.Stats,
+    stats: Stats,
 ) -> int:
     """Find where rays end and shade that; the number of rays that go on."""
     scene, device, n = gbuffer.scene, gbuffer.scene.device, rays.pixel.shape[0]

@@ -22,6 +22,7 @@ import numpy as np
 import warp as wp
 
 from ldtrefl.device import launch
+from ldtrefl.device.stats import Stats
 from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.geometry.sphere import meets_sphere
 from ldtrefl.geometry.vectors import as_double, as_single
@@ -246,7 +247,7 @@ def not_culled(scene: DeviceScene) -> Culled:
     return Culled(regions, shown)
 
 
-def cull_rays(gbuffer: GBuffer, rays: Any, bounce: int, test: CullTest, stats: launch.Stats) -> Culled:
+def cull_rays(gbuffer: GBuffer, rays: Any, bounce: int, test: CullTest, stats: Stats) -> Culled:
     """Test the rays of a bounce, 0 the first.
 
     Counts ``triangles_tested``, those of all reflectors, and ``triangles_culled``, those that are not seen or that none
@@ -267,7 +268,7 @@ def cull_rays(gbuffer: GBuffer, rays: Any, bounce: int, test: CullTest, stats: l
     return Culled(regions_of_runs(bits), objects_in(bits.numpy(), count))
 
 
-def _flat(gbuffer: GBuffer, rays: Any, stats: launch.Stats) -> Culled:
+def _flat(gbuffer: GBuffer, rays: Any, stats: Stats) -> Culled:
     scene, device, count = gbuffer.scene, gbuffer.scene.device, len(gbuffer.scene.objects)
     first_rows, total = scene.reflector_rows
     regions = Regions()

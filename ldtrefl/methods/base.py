@@ -17,7 +17,7 @@ from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass as pydantic_dataclass
 
 from ldtrefl.base.errors import InputError, first_fault, unknown_name
-from ldtrefl.device.launch import Stats
+from ldtrefl.device.stats import Stats
 from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.reflect import BoundTracer, FirstHits
 from ldtrefl.frame.skips import Choice, chosen, names

@@ -20,7 +20,7 @@ from pydantic.dataclasses import dataclass
 
 from ldtrefl.base import budget
 from ldtrefl.device import launch
-from ldtrefl.device.launch import Stats
+from ldtrefl.device.stats import Stats
 from ldtrefl.frame.gbuffer import GBuffer, draw_in_bands
 from ldtrefl.frame.reflect import BoundTracer, no_shadows, shade_gbuffer
 from ldtrefl.methods.base import CONFIG, CommonConfig, Method, Reflection, Trees

@@ -20,7 +20,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from ldtrefl.device.launch import Stats
+from ldtrefl.device.stats import Stats
 from ldtrefl.frame.footprint import finest_footprints
 from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.kept import Followed

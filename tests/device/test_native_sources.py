@@ -12,7 +12,7 @@ import warp as wp
 from stress_cases.inputs import rays_about
 
 import ldtrefl
-from ldtrefl.device import native_sources
+from ldtrefl.device import cpu_threads, native_sources, warp_abi
 from ldtrefl.ldt.exact import build, walk
 from ldtrefl.ldt.exact.tree import TreeView
 from ldtrefl.ldt.exact.walk import CONSTANTS, FILES, SEARCH, TREE
@@ -27,10 +27,14 @@ SHIM = """
 #include <cstdint>
 #include <cstring>
 #define CUDA_CALLABLE
+namespace wp {
+template <int N> struct launch_bounds_t { uint32_t shape[N]; size_t size, coord_mult; };
+}
 """
 """What Warp's headers give native functions."""
 
 SOURCES = {
+    "device/cpu_threads.h": (cpu_threads.CONSTANTS, ()),
     "ldt/linear/march.h": (march.CONSTANTS, ()),
     "device/vectors.h": (build.CONSTANTS, ()),
     "tracing/ray_batch.h": ({}, ("device/vectors.h",)),
@@ -52,7 +56,7 @@ def test_every_file_is_here() -> None:
 def test_a_file_compiles_after_what_it_is_derived_from(name: str, plain: bool, tmp_path: Path) -> None:
     """In a function, as it will stand; ``plain`` is what compilers without vectors see."""
     constants, before = SOURCES[name]
-    body = native_sources.native_body(constants, (*before, name), "")
+    body = warp_abi.CALL_KERNEL + native_sources.native_body(constants, (*before, name), "")
     program = SHIM + "#define PLAIN_VECTORS\n" * plain + "void function() {\n" + body + "\n}\n"
     (tmp_path / "program.cpp").write_text(program)
     command = ["g++", "-std=c++17", "-fsyntax-only", "-Wall", "-Wextra", "-Werror", "-Wno-unused", "-Wno-psabi"]

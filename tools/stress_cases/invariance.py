@@ -143,19 +143,19 @@ def threads_and_runs(pixels: int) -> list[Outcome]:
     """Pictures keep their bits for any number of threads, for any slices, and from run to run."""
     scene = scene_at(1.0, 0.0, pixels)
     outcomes = []
-    usual = cpu_threads.SLICES
+    usual = cpu_threads.SLICES_PER_THREAD
     for by, (method, options) in METHODS.items():
         pictures = []
         for threads, slices in ((1, usual), (2, usual), (3, usual), (5, 7), (2, usual)):
             ldtrefl.set_threads(threads)
-            cpu_threads.SLICES = slices
+            cpu_threads.SLICES_PER_THREAD = slices
             pictures.append(ldtrefl.render(scene, method, **options))
         differ = [int((one.image != pictures[0].image).any(axis=2).sum()) for one in pictures[1:]]
         outcome = Outcome(NAME, "threads, slices, runs", by, tried=4 * pixels * pixels, wrong_hits=sum(differ))
         outcome.non_finite, outcome.limit = not_finite(pictures[0]), "the same bits"
         outcome.passed = not any(differ) and outcome.non_finite == 0
         outcomes.append(outcome)
-    cpu_threads.SLICES = usual
+    cpu_threads.SLICES_PER_THREAD = usual
     ldtrefl.set_threads()
     swapped = dataclasses.replace(scene, objects=scene.objects[::-1])
     for by, (method, options) in METHODS.items():

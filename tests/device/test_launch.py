@@ -1,0 +1,99 @@
+"""Launches: numbers of threads and items, one team for all who launch first, and what the system refuses."""
+
+import threading
+import time
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+import warp as wp
+
+import ldtrefl
+from ldtrefl.device import launch
+from ldtrefl.device.cpu_threads import ThreadTeam
+from ldtrefl.device.python_threads import PythonThreads
+from tests.device.launches import add_number, assert_all_launched
+
+
+@pytest.mark.parametrize("start", [launch.launch, launch.launch_in_order])
+def test_items_that_int32_cannot_number(start: Callable[..., None]) -> None:
+    device = launch.resolve_device(None)
+    numbers = wp.zeros(1, dtype=int, device=device)
+    with pytest.raises(ldtrefl.InputError, match=str(2**31 - 1)):
+        start(add_number, 2**31, [numbers], device)
+
+
+@pytest.mark.parametrize("start", [launch.launch, launch.launch_in_order])
+def test_no_items_launch_nothing(start: Callable[..., None]) -> None:
+    for count in (0, -1):
+        start(add_number, count, ["not an array"], launch.resolve_device(None))
+
+
+def test_numbers_of_threads() -> None:
+    for number in (2, np.int64(2), np.uint8(2)):
+        ldtrefl.set_threads(number)
+        assert launch.thread_count() == 2 and type(launch.thread_count()) is int
+    for wrong in (0, -1, 1025, 10**30, 2.0, "2", True, np.bool_(True), np.float64(2.0), [2]):
+        with pytest.raises(ldtrefl.InputError, match="whole number from 1 to 1024"):
+            ldtrefl.set_threads(wrong)  # type: ignore[arg-type]
+
+
+def test_a_device_that_is_not_here() -> None:
+    with pytest.raises(ldtrefl.InputError, match=r"no device 'abacus' \(here: .*cpu"):
+        launch.resolve_device("abacus")
+
+
+def test_this_warp_is_known() -> None:
+    assert launch.threading_note() is None
+
+
+def test_one_team_for_all_who_launch_first(no_teams: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    made = []
+
+    class Slow(ThreadTeam):
+        def __init__(self, threads: int) -> None:
+            made.append(self)
+            time.sleep(0.05)
+            super().__init__(threads)
+
+    monkeypatch.setattr(launch, "ThreadTeam", Slow)
+    ldtrefl.set_threads(2)
+    callers = [threading.Thread(target=assert_all_launched, args=(1000, 5)) for _ in range(4)]
+    for caller in callers:
+        caller.start()
+    for caller in callers:
+        caller.join()
+    assert len(made) == 1
+    made[0].end()
+
+
+@pytest.mark.parametrize("given", [0, 1])
+@pytest.mark.parametrize("kind", [ThreadTeam, PythonThreads])
+def test_a_system_that_gives_no_more_threads(
+    kind: type[ThreadTeam] | type[PythonThreads], given: int, no_teams: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    launch.resolve_device(None)
+    start, started = threading.Thread.start, []
+
+    def start_some(thread: threading.Thread) -> None:
+        if len(started) == given:
+            raise RuntimeError("can't start new thread")
+        started.append(thread)
+        start(thread)
+
+    monkeypatch.setattr(threading.Thread, "start", start_some)
+    ldtrefl.set_threads(4)
+    launch._state.teams[4] = kind(4)
+    assert_all_launched(10_000, 5)
+    assert len(started) == given
+
+
+def test_equal_arguments_make_one_kernel() -> None:
+    made = []
+
+    @launch.once
+    def make(name: str) -> str:
+        made.append(name)
+        return name * 2
+
+    assert [make("a"), make("b"), make("a")] == ["aa", "bb", "aa"] and made == ["a", "b"]
