@@ -47,8 +47,8 @@ if TYPE_CHECKING:
     )
     from ldtrefl.scene.mesh import Mesh
     from ldtrefl.scene.readers.mesh_files import load_mesh
+    from ldtrefl.tracing.batch import Hits
     from ldtrefl.tracing.bvh import Raycaster
-    from ldtrefl.tracing.trace import Hits
 
 __all__ = [
     "Camera",
@@ -84,7 +84,7 @@ _HOMES = {
     "Camera": "scene.description",
     "Environment": "scene.description",
     "Frame": "renderer",
-    "Hits": "tracing.trace",
+    "Hits": "tracing.batch",
     "InputError": "base.errors",
     "LayeredDepthTexture": "ldt.texture",
     "Light": "scene.description",

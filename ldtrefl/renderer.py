@@ -1,17 +1,14 @@
-"""G-buffer -> method -> composite.
+"""The contents page of a frame: G-buffer -> direct light -> reflection method -> image.
 
-A large image is made in bands of rows (``camera.py``), so that what is needed beside the image does not grow with it.
-Nothing of a large image is kept for the next frame.
+A large image is made in bands of rows (``world/camera.py``), so that what is needed beside the image does not grow with
+it. Nothing of a large image is kept for the next frame.
 """
 
 from __future__ import annotations
 
 import dataclasses
-import functools
 import threading
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import Any, Protocol
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 import warp as wp
@@ -19,16 +16,23 @@ import warp as wp
 from ldtrefl.base import budget
 from ldtrefl.base.errors import InputError
 from ldtrefl.device import launch
-from ldtrefl.device.stats import Stats
-from ldtrefl.frame.gbuffer import BAND_PIXELS, GBuffer, draw_gbuffer, draw_in_bands
-from ldtrefl.frame.kept import KeptDrawing
-from ldtrefl.frame.reflect import FirstHits, Shaded, no_shadows, shade_gbuffer
+from ldtrefl.device.launch import Stats
+from ldtrefl.frame.camera_shading import shade_gbuffer
+from ldtrefl.frame.composite import composed
+from ldtrefl.frame.gbuffer import GBuffer
+from ldtrefl.frame.history import FrameHistory, FrameParts, Reusable
+from ldtrefl.frame.reflected_light import ReflectedLight
+from ldtrefl.frame.result import SMALLER, BandedFrame, Frame, WholeFrame, rows_of
 from ldtrefl.frame.skips import chosen
+from ldtrefl.frame.visibility import BAND_PIXELS, draw_gbuffer, draw_in_bands
 from ldtrefl.methods import find_method
-from ldtrefl.methods.base import Reflection
+from ldtrefl.methods.base import RayMethod
 from ldtrefl.scene.description import Camera, Scene, Vector
-from ldtrefl.tracing.rays import HitBuffer, RayBuffer
+from ldtrefl.tracing.nothing import no_shadows
+from ldtrefl.tracing.tracer import BoundTracer
 from ldtrefl.world.device_scene import DeviceScene
+
+__all__ = ["Frame", "Renderer", "render"]
 
 LARGEST_WHOLE = 1 << 22
 """Pixels up to which an image is made as a whole: 2048 x 2048."""
@@ -38,163 +42,6 @@ IMAGE_BYTES = 13
 
 WORKING_BYTES = 200
 """Of a pixel on the way: its key, what it sees, its radiance, its ray and where that ends."""
-
-HIT_BYTES = 112
-"""Of a pixel that sees a reflector: its ray and where that ends, joined from all bands."""
-
-SMALLER = "camera.width or camera.height"
-"""What takes less memory."""
-
-
-class _Source(Protocol):
-    """What a frame gives beside its image, made when it is asked for."""
-
-    def reflection(self) -> np.ndarray:
-        """``Frame.reflection``."""
-
-    def reflector_mask(self) -> np.ndarray:
-        """``Frame.reflector_mask``."""
-
-    def hits(self) -> FirstHits | None:
-        """``Frame.hits``."""
-
-
-@dataclass(frozen=True, eq=False)
-class Frame:
-    """A rendered image and what it cost. All arrays are the caller's: to write into them changes no other frame.
-
-    All but the image is made when it is first asked for. Of an image of more than 4 million pixels, ``reflection`` and
-    ``hits`` are rendered again, because to keep them would take more than the image does.
-
-    Raises:
-        InputError: ``reflection`` or ``hits`` of a large image need more memory than is allowed.
-    """
-
-    image: np.ndarray
-    """(h, w, 3) float32, linear radiance."""
-    stats: Stats
-    """``seconds`` per stage and ``counters``."""
-    _source: _Source
-
-    @functools.cached_property
-    def reflection(self) -> np.ndarray:
-        """(h, w, 3) float32: the reflected radiance alone, before the reflector's reflectance; 0 outside the mask."""
-        return self._source.reflection()
-
-    @functools.cached_property
-    def reflector_mask(self) -> np.ndarray:
-        """(h, w) bool: pixels that see a reflector."""
-        return self._source.reflector_mask()
-
-    @functools.cached_property
-    def hits(self) -> FirstHits | None:
-        """Where the first reflected rays ended; None for methods without rays."""
-        return self._source.hits()
-
-
-@launch.kernel
-def add_reflection(
-    first: int,
-    # In:
-    pixels: wp.array(dtype=wp.int32),
-    mirror: wp.array(dtype=wp.vec3),
-    reflected: wp.array(dtype=wp.vec3),
-    # In and out:
-    image: wp.array(dtype=wp.vec3),
-):
-    i = first + wp.tid()
-    pixel = pixels[i]
-    image[pixel] = image[pixel] + wp.cw_mul(mirror[i], reflected[pixel])
-
-
-@dataclass(frozen=True, eq=False)
-class _Parts:
-    """What a frame, or a band of one, is composed of."""
-
-    gbuffer: GBuffer
-    shaded: Shaded
-    reflection: Reflection
-    stages: tuple[str, ...]
-    """What was timed."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Arrays:
-    """The rest of a frame that was made as a whole, from the device's arrays: copies, for on the CPU ``numpy`` gives
-    the memory that the next frame may be made of."""
-
-    shape: tuple[int, int]
-    radiance: wp.array
-    reflector: wp.array
-    first_hits: FirstHits | None
-
-    def reflection(self) -> np.ndarray:
-        return np.array(self.radiance.numpy()).reshape(*self.shape, 3)
-
-    def reflector_mask(self) -> np.ndarray:
-        return np.array(self.reflector.numpy()).view(bool).reshape(self.shape)
-
-    def hits(self) -> FirstHits | None:
-        # A frame's own, for it keeps the pictures that it has been asked for.
-        return None if self.first_hits is None else dataclasses.replace(self.first_hits)
-
-
-@dataclass(frozen=True, eq=False)
-class _Again:
-    """The rest of a frame that was made in bands: rendered again by a new renderer, which gives the same bits."""
-
-    mask: np.ndarray
-    camera: Camera
-    scene: Scene
-    method: str
-    device: str
-    options: dict[str, Any]
-
-    def _bands(self) -> Iterator[_Parts]:
-        return Renderer(self.scene, self.method, self.device, **self.options)._bands(self.camera, Stats())
-
-    def reflection(self) -> np.ndarray:
-        height, width = self.mask.shape
-        budget.take(12 * self.mask.size, f"the reflection in an image of {width} x {height} pixels", SMALLER)
-        picture = np.empty((height, width, 3), np.float32)
-        for parts in self._bands():
-            picture[_rows(parts.gbuffer)] = parts.reflection.radiance.numpy().reshape(*parts.gbuffer.shape, 3)
-        return picture
-
-    def reflector_mask(self) -> np.ndarray:
-        return self.mask
-
-    def hits(self) -> FirstHits | None:
-        height, width = self.mask.shape
-        rays = f"the reflected rays of an image of {width} x {height} pixels"
-        budget.take(HIT_BYTES * int(np.count_nonzero(self.mask)), rays, SMALLER)
-        found = []
-        for parts in self._bands():
-            if parts.reflection.hits is None and parts.shaded.rays.pixel.shape[0]:
-                return None
-            if parts.reflection.hits is not None:
-                found.append((parts.gbuffer.band.first_row * width, parts.reflection.hits))
-        if not found:
-            return None
-        buffers = _joined(RayBuffer, [hits.rays for _, hits in found]), _joined(HitBuffer, [h.ends for _, h in found])
-        pixels = np.concatenate([first + hits.rays.pixel.numpy() for first, hits in found])
-        buffers[0].pixel = wp.array(pixels, dtype=wp.int32, device=self.device)
-        return FirstHits((height, width), *buffers, found[0][1].device_units_per_world_unit)
-
-
-def _joined(kind: Any, buffers: Sequence[Any]) -> Any:
-    """Arrays of several structs one after another, in one of the same kind."""
-    made = kind()
-    for name in kind.vars:
-        arrays = [getattr(buffer, name) for buffer in buffers]
-        values = np.concatenate([array.numpy() for array in arrays])
-        setattr(made, name, wp.array(values, dtype=arrays[0].dtype, device=arrays[0].device))
-    return made
-
-
-def _rows(gbuffer: GBuffer) -> slice:
-    """The rows of the image that a band is."""
-    return slice(gbuffer.band.first_row, gbuffer.band.first_row + gbuffer.band.rows)
 
 
 class Renderer:
@@ -206,7 +53,7 @@ class Renderer:
     same meshes, too. After a call that fails or is stopped the scene is as it was, and the next frame is right.
     """
 
-    def __init__(self, scene: Scene, method: str | None = None, device: str | None = None, **options: Any) -> None:
+    def __init__(self, scene: Scene, method: str | None = None, device: str | None = None, **options: object) -> None:
         """Upload the scene.
 
         Args:
@@ -222,15 +69,15 @@ class Renderer:
             raise InputError(f"a Scene is needed, got {type(scene).__name__} (load_scene reads one from a file)")
         kind = find_method(scene.reflection.method if method is None else method)
         config = kind.configured(options)
-        skips = chosen(config.skip)
         self._lock = threading.RLock()
-        self._options = dict(options)
-        self._device_scene = DeviceScene(scene, launch.resolve_device(device), skip_attributes=skips.attributes)
-        self._method = kind(self._device_scene, config)
-        self._drawing = KeptDrawing()
-        self._last: _Parts | None = None
-        self._seen: tuple[DeviceScene, Camera] | None = None
-        """By the last frame, if it was made in bands."""
+        self._name, self._options = kind.name, dict(options)
+        self._skips = chosen(config.skip)
+        device_scene = DeviceScene(scene, launch.resolve_device(device), skip_attributes=self._skips.attributes)
+        self._device_scene = device_scene
+        self._tracer = kind.scene_tracer(config)
+        """Answers the rays of methods that have any, and the shadow rays of every method."""
+        self._method = kind(device_scene, config, self._tracer)
+        self._history = FrameHistory(keeps=self._skips.frames)
         self._bytes_taken = 0
         """For the largest frame so far."""
 
@@ -257,9 +104,9 @@ class Renderer:
         given = {"translate": translate, "rotate": rotate, "scale": scale}
         changes = {key: value for key, value in given.items() if value is not None}
         with self._lock:
-            before, skips = self._device_scene, self._method.skips
+            before = self._device_scene
             scene = before.scene.with_object(name, **changes)
-            self._device_scene = DeviceScene(scene, before.device, before, skip_attributes=skips.attributes)
+            self._device_scene = DeviceScene(scene, before.device, before, skip_attributes=self._skips.attributes)
 
     def render(self, camera: Camera | None = None) -> Frame:
         """Render a frame, seen by ``camera`` or else by the scene's own.
@@ -295,78 +142,85 @@ class Renderer:
 
     def _whole(self, camera: Camera) -> Frame:
         scene, stats = self._looking_from(camera), Stats()
-        last = self._last if self._method.skips.frames else None
-        is_kept = last is not None and last.gbuffer.camera == camera and last.gbuffer.scene is scene
-        if is_kept and last is not None:
-            parts = last
+        parts = self._history.unchanged(scene, camera)
+        if parts is not None:
             stats.count("frames_kept", 1)
             stats.count("rays_kept", parts.shaded.rays.pixel.shape[0])
             stats.seconds.update(dict.fromkeys(parts.stages, 0.0))
         else:
-            self._last = last = None  # its memory is used again
+            reusable = self._history.reusable(scene, camera)
             with stats.stage("gbuffer", scene.device):
-                keeps = self._method.skips.frames
-                gbuffer = self._drawing.gbuffer(scene, camera) if keeps else draw_gbuffer(scene, camera)
-            parts = self._parts(gbuffer, stats)
-        image = self._composite(parts, stats)
-        self._last, self._seen = parts, None
-        stats.count("rays", 0)
-        stats.count("attribute_bytes", scene.attribute_bytes)
-        shape, view, reflection = parts.gbuffer.shape, parts.gbuffer.view, parts.reflection
-        return Frame(image, stats, _Arrays(shape, reflection.radiance, view.reflector, reflection.hits))
+                gbuffer = self._history.gbuffer(scene, camera)
+            parts = self._parts(gbuffer, reusable, stats)
+        image = self._composed(parts, stats)
+        self._history.keep(scene, camera, parts)
+        self._count(scene, stats)
+        return Frame(image, stats, WholeFrame.of(parts))
 
     def _in_bands(self, camera: Camera) -> Frame:
         scene, stats = self._device_scene, Stats()
         image = np.empty((camera.height, camera.width, 3), np.float32)
         mask = np.empty((camera.height, camera.width), bool)
         for parts in self._bands(camera, stats):
-            image[_rows(parts.gbuffer)] = self._composite(parts, stats)
-            mask[_rows(parts.gbuffer)] = parts.gbuffer.reflector_mask
-        self._last, self._seen = None, (scene, camera)
-        stats.count("rays", 0)
-        stats.count("attribute_bytes", scene.attribute_bytes)
-        device = str(scene.device)
-        return Frame(image, stats, _Again(mask, camera, scene.scene, self._method.name, device, self._options))
+            image[rows_of(parts.gbuffer)] = self._composed(parts, stats)
+            mask[rows_of(parts.gbuffer)] = parts.gbuffer.reflector_mask
+        self._history.keep_view(scene, camera)
+        self._count(scene, stats)
+        return Frame(image, stats, BandedFrame(mask, self._bands_again(scene, camera)))
 
-    def _bands(self, camera: Camera, stats: Stats) -> Iterator[_Parts]:
+    def _bands_again(self, scene: DeviceScene, camera: Camera) -> Callable[[], Iterator[FrameParts]]:
+        """A function that renders the bands again by a new renderer, whatever moves meanwhile."""
+        description, device = scene.scene, str(scene.device)
+
+        def bands() -> Iterator[FrameParts]:
+            return Renderer(description, self._name, device, **self._options)._bands(camera, Stats())
+
+        return bands
+
+    def _bands(self, camera: Camera, stats: Stats) -> Iterator[FrameParts]:
         """A large image from top to bottom; nothing of it, nor of the last frame, is kept."""
         scene = self._looking_from(camera)
-        self._last = None
-        self._drawing.forget()
-        self._method.forget()
+        self._history.forget()
         bands = draw_in_bands(scene, camera)
         while True:
             with stats.stage("gbuffer", scene.device):
                 gbuffer = next(bands, None)
             if gbuffer is None:
                 return
-            yield self._parts(gbuffer, stats)
+            yield self._parts(gbuffer, None, stats)
 
-    def _parts(self, gbuffer: GBuffer, stats: Stats) -> _Parts:
+    def _parts(self, gbuffer: GBuffer, reusable: Reusable | None, stats: Stats) -> FrameParts:
         """Direct light and reflections."""
-        method, scene = self._method, gbuffer.scene
-        device = scene.device
-        shadow = method.shadow_tracer(gbuffer, stats) if scene.lighting.shadows else no_shadows(device)
+        method, device = self._method, gbuffer.scene.device
+        shadow = self._shadow_tracer(gbuffer, stats)
         with stats.stage("shade", device):
-            shaded = shade_gbuffer(gbuffer, shadow)
-        if shaded.rays.pixel.shape[0] or not method.skips.reflection:
-            reflection = method.reflect(gbuffer, shaded.rays, stats)
+            shaded = shade_gbuffer(gbuffer, shadow, starts_rays=isinstance(method, RayMethod))
+        if not gbuffer.reflector_pixels.shape[0] and self._skips.reflection:
+            reflected = ReflectedLight(wp.empty(0, dtype=wp.vec3, device=device))
+        elif isinstance(method, RayMethod):
+            reflected = method.reflect_rays(gbuffer, shaded.rays, reusable, stats)
         else:
-            reflection = Reflection(wp.zeros(gbuffer.pixel_count, dtype=wp.vec3, device=device))
-        return _Parts(gbuffer, shaded, reflection, tuple(stats.seconds))
+            reflected = ReflectedLight(method.reflect(gbuffer, stats))
+        return FrameParts(gbuffer, shaded, reflected, tuple(stats.seconds))
 
-    def _composite(self, parts: _Parts, stats: Stats) -> np.ndarray:
+    def _shadow_tracer(self, gbuffer: GBuffer, stats: Stats) -> BoundTracer:
+        """What answers shadow rays from what the camera sees."""
+        scene = gbuffer.scene
+        if not scene.lighting.shadows:
+            return no_shadows(scene.device)
+        self._method.foresee(gbuffer, stats)
+        return self._tracer.bound(scene, {entry.index for entry in scene.objects}, stats)
+
+    def _composed(self, parts: FrameParts, stats: Stats) -> np.ndarray:
         """(h, w, 3) float32 radiance of a frame or a band."""
-        gbuffer, shaded = parts.gbuffer, parts.shaded
-        reflector_pixels = shaded.rays.pixel.shape[0]
-        stats.count("pixels", gbuffer.pixel_count)
-        stats.count("reflector_pixels", reflector_pixels)
-        with stats.stage("composite", gbuffer.scene.device):
-            image = wp.clone(shaded.radiance)
-            inputs = [shaded.rays.pixel, shaded.mirror, parts.reflection.radiance, image]
-            launch.launch(add_reflection, reflector_pixels, inputs, gbuffer.scene.device)
-            picture: np.ndarray = image.numpy().reshape(*gbuffer.shape, 3)
-        return picture
+        stats.count("pixels", parts.gbuffer.pixel_count)
+        stats.count("reflector_pixels", parts.gbuffer.reflector_pixels.shape[0])
+        with stats.stage("composite", parts.gbuffer.scene.device):
+            return composed(parts)
+
+    def _count(self, scene: DeviceScene, stats: Stats) -> None:
+        stats.count("rays", 0)  # methods without rays have that counter, too
+        stats.count("attribute_bytes", scene.attribute_bytes)
 
     @property
     def gbuffer(self) -> GBuffer | None:
@@ -376,19 +230,22 @@ class Renderer:
             InputError: a large frame, which keeps none, needs more memory for it than is allowed.
         """
         with self._lock:
-            if self._seen is not None:
-                scene, camera = self._seen
-                pixels = camera.width * camera.height
-                budget.take(WORKING_BYTES // 4 * pixels, f"a G-buffer of {camera.width} x {camera.height}", SMALLER)
-                return draw_gbuffer(scene, camera)
-            return None if self._last is None else dataclasses.replace(self._last.gbuffer)
+            kept, view = self._history.last_gbuffer, self._history.last_view
+            if kept is not None:
+                return dataclasses.replace(kept)
+            if view is None:
+                return None
+            scene, camera = view
+            pixels = camera.width * camera.height
+            budget.take(WORKING_BYTES // 4 * pixels, f"a G-buffer of {camera.width} x {camera.height}", SMALLER)
+            return draw_gbuffer(scene, camera)
 
     def texel_sizes(self, resolution: int) -> np.ndarray:
         """(objects,) length in the world of a texel of each object's maps at ``resolution``."""
         return np.array([entry.longest_side / resolution for entry in self._device_scene.objects])
 
 
-def render(scene: Scene, method: str | None = None, device: str | None = None, **options: Any) -> Frame:
+def render(scene: Scene, method: str | None = None, device: str | None = None, **options: object) -> Frame:
     """Render one frame; see :class:`Renderer`.
 
     Raises:

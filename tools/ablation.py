@@ -29,9 +29,10 @@ from ldtrefl.base.errors import InputError
 from ldtrefl.device import launch
 from ldtrefl.files.whole import written_whole
 from ldtrefl.frame import skips
-from ldtrefl.frame.reflect import no_shadows, shade_gbuffer
+from ldtrefl.frame.camera_shading import shade_gbuffer
 from ldtrefl.renderer import Frame, Renderer
 from ldtrefl.scene.description import Camera, Material, Object, Scene
+from ldtrefl.tracing.nothing import no_shadows
 
 ROOT = Path(__file__).parent.parent
 SHIPPED = ("teapot", "wall", "bowl_mirror", "torus_mirror", "genus3_knot", "three_genus3")
@@ -245,7 +246,8 @@ def culling(scene: Scene, rounds: int) -> dict[str, Any] | None:
 def rays_that_enter(renderer: Renderer) -> int:
     """Pairs of a reflected ray of the last frame and another object's bounding sphere that it meets, in float64."""
     assert renderer.gbuffer is not None
-    rays, count = shade_gbuffer(renderer.gbuffer, no_shadows(renderer.gbuffer.scene.device)).rays, 0
+    no_shadow, count = no_shadows(renderer.gbuffer.scene.device), 0
+    rays = shade_gbuffer(renderer.gbuffer, no_shadow, starts_rays=True).rays
     origin, direction = rays.origin.numpy().astype(float), rays.direction.numpy().astype(float)
     source = rays.source.numpy()
     for entry in renderer.gbuffer.scene.objects:

@@ -17,7 +17,7 @@ from stress_cases.inputs import camera_rays
 from timing import timed_in_turn
 
 from ldtrefl.device import launch
-from ldtrefl.frame.gbuffer import draw_gbuffer
+from ldtrefl.frame.visibility import draw_gbuffer
 from ldtrefl.scene.description import Camera, Object, Scene
 from ldtrefl.tracing.bvh import Raycaster
 from ldtrefl.world.device_scene import DeviceScene

@@ -13,9 +13,9 @@ import numpy as np
 from skimage.metrics import structural_similarity
 
 from ldtrefl.files.pictures import srgb_from_linear
+from ldtrefl.frame.first_hits import FirstHits
 from ldtrefl.frame.gbuffer import GBuffer
-from ldtrefl.frame.reflect import FirstHits
-from ldtrefl.tracing.rays import distance_across
+from ldtrefl.tracing.ray_buffers import distance_across
 
 SSIM_WINDOW = 11
 """Pixels along a side of SSIM's Gaussian window (sigma 1.5; Wang et al. 2004)."""

@@ -11,8 +11,9 @@ from __future__ import annotations
 import numpy as np
 
 from ldtrefl.frame.gbuffer import GBuffer
-from ldtrefl.frame.regions import Culled
-from ldtrefl.tracing.rays import RayBuffer, distance_across, rays_of, run_count
+from ldtrefl.frame.regions import Regions
+from ldtrefl.tracing.object_sets import rays_of, run_count
+from ldtrefl.tracing.ray_buffers import RayBuffer, distance_across
 from ldtrefl.world.device_object import DeviceObject
 
 FINEST = 5.0
@@ -72,21 +73,21 @@ def pixel_spacing(gbuffer: GBuffer) -> float | None:
     return 2.0 * depth * float(np.linalg.norm(np.array(camera.down, float))) / camera.height
 
 
-def finest_footprints(gbuffer: GBuffer, rays: RayBuffer, culled: Culled, *, is_seen: bool) -> dict[int, float | None]:
+def finest_footprints(gbuffer: GBuffer, rays: RayBuffer, regions: Regions, *, is_seen: bool) -> dict[int, float | None]:
     """Number of an object -> the smallest footprint on it, device units; None where none is known.
 
     Args:
         rays: a bounce's.
-        culled: which objects they can meet; the others are left out.
+        regions: which objects they can meet; the others are left out.
         is_seen: whether what the camera itself sees counts, too; then no object is left out.
     """
-    bits = culled.regions.bits.numpy()
-    by_runs = len(bits) > 0 and culled.regions.rows.shape[0] == 0
+    bits = regions.sets.bits.numpy()
+    by_runs = len(bits) > 0 and regions.sets.rows.shape[0] == 0
     every_run = np.arange(run_count(rays.pixel.shape[0]))
     spacing = pixel_spacing(gbuffer) if is_seen else None
     finest: dict[int, float | None] = {}
     for entry in gbuffer.scene.objects:
-        is_shown = entry.index in culled.shown
+        is_shown = entry.index in regions.shown
         if not is_shown and not is_seen:
             continue
         apart = [spacing]

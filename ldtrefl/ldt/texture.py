@@ -28,7 +28,8 @@ from ldtrefl.ldt.peel import Maps, Rasteriser, check_fragments, check_order, sor
 from ldtrefl.ldt.searches import TRACERS
 from ldtrefl.ldt.texel_frame import FACE_NAMES, TexelFrame, texel_frame
 from ldtrefl.scene.mesh import Mesh
-from ldtrefl.tracing.trace import Hits, array_of_views, occluded_batch, trace_batch, trace_in_unit_space
+from ldtrefl.tracing.batch import Hits, occluded_batch, trace_batch, trace_in_unit_space
+from ldtrefl.tracing.tracer import array_of_views
 from ldtrefl.world.device_mesh import DeviceMesh
 
 FORMAT = 1
@@ -374,7 +375,7 @@ def _shows_backs(tree: Tree) -> bool:
     origins, directions = _rays_all_around(str(device))
     views = array_of_views([tree.view], TRACERS["exact"].view, device)
     hits = trace_in_unit_space(TRACERS["exact"], views, origins, directions)
-    towards = (hits.normal.numpy() * directions.numpy()).sum(axis=1)
+    towards = (hits.normal * directions.numpy()).sum(axis=1)
     return int((tree.view.front * towards > GRAZING).sum()) > FEW_BACKS
 
 

@@ -22,7 +22,7 @@ def all_methods() -> dict[str, type[Method]]:
         if module.name != "base":
             loaded = importlib.import_module(f"{__name__}.{module.name}")
             for value in vars(loaded).values():
-                if isinstance(value, type) and issubclass(value, Method) and value is not Method:
+                if isinstance(value, type) and issubclass(value, Method) and value.__module__ == loaded.__name__:
                     found[value.name] = value
     return dict(sorted(found.items()))
 

@@ -1,15 +1,17 @@
-"""The contract of a reflection method: from a G-buffer to an image of reflected radiance.
+"""The contract of a reflection method: from a G-buffer to the radiance that its reflector pixels reflect.
 
-A method is a class with a ``name`` and a ``Config``. It is made once per renderer, so it may keep maps and trees
-between frames, and asked once per frame, or once for each band of a large one. Whatever it keeps, a frame has the bits
-that a new renderer gives it. It is never asked by two threads at once.
+A method is a class with a ``name`` and a ``Config``. It is made once per renderer, so it may keep what it has made of
+meshes, and asked once per frame, or once for each band of a large one. It keeps nothing of a frame: what the next frame
+may use again is kept by the renderer (``frame/history.py``). It is never asked by two threads at once.
+
+A ``Method`` has no rays: it is handed the G-buffer and answers for its ``reflector_pixels``. A ``RayMethod`` is handed
+the rays that leave those pixels, too. Shadows are asked of the renderer's tracer, which the method's class chooses.
 """
 
 from __future__ import annotations
 
 import abc
 import dataclasses
-from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 
 import warp as wp
@@ -19,42 +21,16 @@ from pydantic.dataclasses import dataclass as pydantic_dataclass
 from ldtrefl.base.errors import InputError, first_fault, unknown_name
 from ldtrefl.device.stats import Stats
 from ldtrefl.frame.gbuffer import GBuffer
-from ldtrefl.frame.reflect import BoundTracer, FirstHits
+from ldtrefl.frame.history import Reusable
+from ldtrefl.frame.reflected_light import ReflectedLight
 from ldtrefl.frame.skips import Choice, chosen, names
-from ldtrefl.tracing.bvh import BVH, BvhView, Raycaster
-from ldtrefl.tracing.trace import array_of_views
-from ldtrefl.world.device_mesh import DeviceMesh
+from ldtrefl.tracing.ray_buffers import RayBuffer
+from ldtrefl.tracing.scene_bvh import SceneBvh
+from ldtrefl.tracing.tracer import SceneTracer
 from ldtrefl.world.device_scene import DeviceScene
 
 CONFIG = ConfigDict(extra="forbid", use_attribute_docstrings=True)
 """How every method's ``Config`` is checked."""
-
-
-@dataclass(frozen=True, eq=False)
-class Reflection:
-    """A method's answer."""
-
-    radiance: wp.array
-    """(h * w,) vec3: reflected radiance per pixel, before the reflector's own reflectance; 0 off the reflectors."""
-    hits: FirstHits | None = None
-    """Where the first rays ended, for methods that have rays."""
-
-
-class Trees:
-    """The BVHs of a scene, one a mesh, built when they are first needed."""
-
-    def __init__(self) -> None:
-        self._bound: tuple[BoundTracer, dict[DeviceMesh, Raycaster]] | None = None
-
-    def bound(self, scene: DeviceScene, stats: Stats) -> BoundTracer:
-        """The tracer over all objects, of this scene and of all that come from it."""
-        if self._bound is None:
-            with stats.stage("build", scene.device):
-                meshes = dict.fromkeys(entry.geometry for entry in scene.objects)
-                trees = {mesh: Raycaster.of(mesh) for mesh in meshes}
-                views = [trees[entry.geometry].view() for entry in scene.objects]
-                self._bound = BoundTracer(BVH, array_of_views(views, BvhView, scene.device)), trees
-        return self._bound[0]
 
 
 @pydantic_dataclass(frozen=True, kw_only=True, config=CONFIG)
@@ -68,33 +44,36 @@ class CommonConfig:
 
 
 class Method(abc.ABC):
-    """A way to compute reflections."""
+    """A way to compute reflections without rays."""
 
     name: ClassVar[str]
     Config: ClassVar[type]
     """A frozen pydantic dataclass, a docstring under each field."""
 
-    def __init__(self, scene: DeviceScene, config: Any) -> None:
+    def __init__(self, scene: DeviceScene, config: CommonConfig, tracer: SceneTracer) -> None:
         self.scene = scene
         self.config = config
+        self.tracer = tracer
+        """The renderer's."""
         self.skips = chosen(config.skip)
+
+    @classmethod
+    def scene_tracer(cls, config: CommonConfig) -> SceneTracer:
+        """What a renderer asks for shadows, and for the rays of methods that have any: the ray caster by default."""
+        return SceneBvh()
 
     def place(self, scene: DeviceScene) -> None:
         """Go on with a scene in which some objects have moved, their meshes and all else the same."""
         self.scene = scene
 
-    @abc.abstractmethod
-    def reflect(self, gbuffer: GBuffer, rays: Any, stats: Stats) -> Reflection:
-        """The reflections in what the camera sees, from the ``RayBuffer`` of its pixels that see a reflector. Called
-        only if there are any."""
+    def foresee(self, gbuffer: GBuffer, stats: Stats) -> None:  # noqa: B027  (most methods have nothing to foresee)
+        """Make the tracer ready for what the camera sees. Called before shadow rays are asked of it, only if the scene
+        has shadows."""
 
     @abc.abstractmethod
-    def shadow_tracer(self, gbuffer: GBuffer, stats: Stats) -> BoundTracer:
-        """What answers shadow rays from what the camera sees. Called before ``reflect``, only if the scene has
-        shadows."""
-
-    def forget(self) -> None:  # noqa: B027  (most methods keep nothing of the kind)
-        """Drop what is kept of the last frame's pixels: the next frame is too large for that."""
+    def reflect(self, gbuffer: GBuffer, stats: Stats) -> wp.array:
+        """(m,) vec3: the radiance that reaches each of the G-buffer's ``reflector_pixels`` by way of the mirror, before
+        the reflector's own reflectance. Called only if there are any, unless that skip is off."""
 
     @classmethod
     def describe(cls) -> str:
@@ -111,7 +90,7 @@ class Method(abc.ABC):
         }
 
     @classmethod
-    def configured(cls, options: dict[str, Any]) -> Any:
+    def configured(cls, options: dict[str, object]) -> Any:
         """A checked ``Config``.
 
         Raises:
@@ -126,3 +105,22 @@ class Method(abc.ABC):
             raise first_fault(error, {}).within(f"method {cls.name}") from None
         except InputError as error:
             raise error.within(f"method {cls.name}") from None
+
+
+class RayMethod(Method):
+    """A way to compute reflections by rays."""
+
+    @abc.abstractmethod
+    def reflect_rays(
+        self, gbuffer: GBuffer, rays: RayBuffer, reusable: Reusable | None, stats: Stats
+    ) -> ReflectedLight:
+        """The reflections in what the camera sees, from the rays that leave its ``reflector_pixels``.
+
+        Args:
+            rays: one for each of these pixels, or several in a row, in the order of the pixels. They stay as they are.
+            reusable: the last frame's answer, if the same camera saw it, and what has moved since.
+        """
+
+    def reflect(self, gbuffer: GBuffer, stats: Stats) -> wp.array:
+        """A method with rays is handed them."""
+        raise NotImplementedError

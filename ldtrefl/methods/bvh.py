@@ -10,20 +10,24 @@ Fails: nowhere that the scene's triangles can tell; its cost grows with them, an
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated
 
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from ldtrefl.device.stats import Stats
+from ldtrefl.device.launch import Stats
+from ldtrefl.frame.bounces import RayFollower, summed_by_pixel
+from ldtrefl.frame.first_hits import FirstHits
 from ldtrefl.frame.gbuffer import GBuffer
-from ldtrefl.frame.reflect import BoundTracer, follow_rays
-from ldtrefl.frame.regions import not_culled
-from ldtrefl.methods.base import CONFIG, CommonConfig, Method, Reflection, Trees
-from ldtrefl.world.device_scene import DeviceScene
+from ldtrefl.frame.history import Reusable
+from ldtrefl.frame.reflected_light import ReflectedLight
+from ldtrefl.frame.regions import Regions, all_objects
+from ldtrefl.methods.base import CONFIG, CommonConfig, RayMethod
+from ldtrefl.tracing.ray_buffers import RayBuffer
+from ldtrefl.tracing.tracer import BoundTracer
 
 
-class Bvh(Method):
+class Bvh(RayMethod):
     """Ray casting through a BVH over the triangles: the ground truth."""
 
     name = "bvh"
@@ -35,18 +39,22 @@ class Bvh(Method):
         max_bounces: Annotated[int, Field(strict=True, ge=1, le=64)] | None = None
         """Reflections in reflections; the scene's number if not given."""
 
-    def __init__(self, scene: DeviceScene, config: Any) -> None:
-        super().__init__(scene, config)
-        self._trees = Trees()
+    config: Config
 
-    def shadow_tracer(self, gbuffer: GBuffer, stats: Stats) -> BoundTracer:
-        """The BVH itself."""
-        return self._trees.bound(self.scene, stats)
-
-    def reflect(self, gbuffer: GBuffer, rays: Any, stats: Stats) -> Reflection:
+    def reflect_rays(
+        self, gbuffer: GBuffer, rays: RayBuffer, reusable: Reusable | None, stats: Stats
+    ) -> ReflectedLight:
         """Trace every reflected ray."""
         bounces = self.config.max_bounces or self.scene.scene.reflection.max_bounces
-        everything = not_culled(self.scene)
-        cull, bind = (lambda _rays, _bounce: everything), (lambda _objects: self._trees.bound(self.scene, stats))
-        followed, hits = follow_rays(gbuffer, rays, cull, bind, bounces, self.skips, stats)
-        return Reflection(followed.radiance, hits)
+        follower = RayFollower(gbuffer, self, bounces, self.skips, stats)
+        followed = follower.follow(rays, follower.first_regions(rays))
+        hits = FirstHits.of(gbuffer, followed)
+        return ReflectedLight(summed_by_pixel(gbuffer.reflector_pixels, rays, followed.radiance), hits)
+
+    def regions(self, gbuffer: GBuffer, rays: RayBuffer, bounce: int, stats: Stats) -> Regions:
+        """Every ray may meet every other object."""
+        return all_objects(self.scene)
+
+    def traced(self, objects: set[int], stats: Stats) -> BoundTracer:
+        """The BVHs of all objects."""
+        return self.tracer.bound(self.scene, objects, stats)

@@ -11,7 +11,7 @@ contact shows a gap.
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 import warp as wp
@@ -20,17 +20,29 @@ from pydantic.dataclasses import dataclass
 
 from ldtrefl.base import budget
 from ldtrefl.device import launch
-from ldtrefl.device.stats import Stats
-from ldtrefl.frame.gbuffer import GBuffer, draw_in_bands
-from ldtrefl.frame.reflect import BoundTracer, no_shadows, shade_gbuffer
-from ldtrefl.methods.base import CONFIG, CommonConfig, Method, Reflection, Trees
+from ldtrefl.device.launch import Stats
+from ldtrefl.frame.camera_shading import shade_gbuffer
+from ldtrefl.frame.gbuffer import GBuffer, GBufferView, pixel_surface, pixel_view
+from ldtrefl.frame.visibility import draw_in_bands
+from ldtrefl.geometry.bilinear import bilinear_blend, neighbours_clamped
+from ldtrefl.methods.base import CONFIG, CommonConfig, Method
 from ldtrefl.scene.description import Camera
-from ldtrefl.tracing.rays import RayBuffer
-from ldtrefl.world.device_object import DeviceObject
+from ldtrefl.shading.specular import mirror_direction
+from ldtrefl.tracing.nothing import no_shadows
+from ldtrefl.tracing.tracer import SceneTracer
 from ldtrefl.world.device_scene import DeviceScene
+from ldtrefl.world.device_object import DeviceObject
+from ldtrefl.world.records import ObjectRecord
 
 PIXEL_BYTES = 12
 """Of a cube map."""
+
+LEAST_DEPTH = wp.constant(0.5)
+"""Of a unit vector along the axis of the face that it points to: it is 0.577 or more, and what the eye touches has no
+direction at all."""
+
+LEAST_SIZE = 1e-6
+"""Of a reflector's distance from the world's origin, how far from its centre a cube map's camera looks at least."""
 
 
 @wp.func
@@ -48,41 +60,49 @@ def cube_face(direction: wp.vec3) -> int:
 
 @wp.func
 def look_up(cube: wp.array(dtype=wp.vec3), resolution: int, direction: wp.vec3) -> wp.vec3:
-    """Bilinear radiance of a cube map; samples beyond a face's edge are its border's."""
+    """Bilinear radiance of a cube map in a unit direction; samples beyond a face's edge are its border's."""
     face = cube_face(direction)
     # The face's camera: forward along its axis, up +z, or +y for the faces of z.
     forward = wp.vec3(0.0)
     forward[face / 2] = wp.where(face % 2 == 0, 1.0, -1.0)
     up = wp.where(face >= 4, wp.vec3(0.0, 1.0, 0.0), wp.vec3(0.0, 0.0, 1.0))
     right = wp.cross(forward, up)
-    # A unit vector points to its face at 0.577 or more; what the eye touches has no direction at all.
-    depth = wp.max(wp.dot(direction, forward), 0.5)
+    depth = wp.max(wp.dot(direction, forward), LEAST_DEPTH)
     x = 0.5 * float(resolution) * (wp.dot(direction, right) / depth + 1.0) - 0.5
     y = 0.5 * float(resolution) * (1.0 - wp.dot(direction, up) / depth) - 0.5
-    last = resolution - 1
-    x0, y0 = wp.clamp(int(wp.floor(x)), 0, last), wp.clamp(int(wp.floor(y)), 0, last)
-    x1, y1 = wp.clamp(int(wp.floor(x)) + 1, 0, last), wp.clamp(int(wp.floor(y)) + 1, 0, last)
-    fx, fy = x - wp.floor(x), y - wp.floor(y)
-    first = face * resolution * resolution
-    upper = (1.0 - fx) * cube[first + y0 * resolution + x0] + fx * cube[first + y0 * resolution + x1]
-    lower = (1.0 - fx) * cube[first + y1 * resolution + x0] + fx * cube[first + y1 * resolution + x1]
-    return (1.0 - fy) * upper + fy * lower
+    columns, rows = neighbours_clamped(x, resolution), neighbours_clamped(y, resolution)
+    upper = (face * resolution + rows.before) * resolution
+    lower = (face * resolution + rows.after) * resolution
+    return bilinear_blend(
+        columns,
+        rows,
+        cube[upper + columns.before],
+        cube[upper + columns.after],
+        cube[lower + columns.before],
+        cube[lower + columns.after],
+    )
 
 
 @launch.kernel
 def reflect_cube(
     first: int,
     # In:
-    rays: RayBuffer,
+    pixels: wp.array(dtype=wp.int32),
+    gbuffer: GBufferView,
+    objects: wp.array(dtype=ObjectRecord),
     reflector: int,
     cube: wp.array(dtype=wp.vec3),
     resolution: int,
     # Out:
     radiance_out: wp.array(dtype=wp.vec3),
 ):
+    """Look up what one pixel reflects, if it sees this reflector."""
     i = first + wp.tid()
-    if rays.source[i] == reflector:
-        radiance_out[rays.pixel[i]] = look_up(cube, resolution, rays.direction[i])
+    pixel = pixels[i]
+    if gbuffer.object[pixel] == reflector:
+        view = pixel_view(gbuffer, objects, pixel)
+        surface = pixel_surface(gbuffer, objects, pixel, view)
+        radiance_out[i] = look_up(cube, resolution, mirror_direction(view.direction, surface.normal))
 
 
 class EnvironmentMap(Method):
@@ -97,9 +117,10 @@ class EnvironmentMap(Method):
         resolution: Annotated[int, Field(strict=True, ge=1, le=4096)] = 512
         """Pixels along a side of each face, 1 to 4096."""
 
-    def __init__(self, scene: DeviceScene, config: Any) -> None:
-        super().__init__(scene, config)
-        self._trees = Trees()
+    config: Config
+
+    def __init__(self, scene: DeviceScene, config: CommonConfig, tracer: SceneTracer) -> None:
+        super().__init__(scene, config, tracer)
         self._cubes: dict[int, wp.array] = {}
         """By number of the reflector."""
         self._up: tuple[float, ...] = ()
@@ -112,16 +133,11 @@ class EnvironmentMap(Method):
         super().place(scene)
         self._cubes.clear()
 
-    def shadow_tracer(self, gbuffer: GBuffer, stats: Stats) -> BoundTracer:
-        """A cube map has no shadow rays of its own: a BVH answers them."""
-        return self._trees.bound(self.scene, stats)
-
-    def reflect(self, gbuffer: GBuffer, rays: Any, stats: Stats) -> Reflection:
+    def reflect(self, gbuffer: GBuffer, stats: Stats) -> wp.array:
         """Draw the cube maps on first need, then look up every reflector pixel."""
-        device, n = self.scene.device, rays.pixel.shape[0]
-        radiance = wp.zeros(gbuffer.pixel_count, dtype=wp.vec3, device=device)
-        stats.count("rays", n)
-        seen = set(np.unique(rays.source.numpy()).tolist())
+        device, pixels = self.scene.device, gbuffer.reflector_pixels
+        radiance = wp.zeros(pixels.shape[0], dtype=wp.vec3, device=device)
+        seen = set(np.unique(gbuffer.view.object.numpy()[pixels.numpy()]).tolist())
         up = tuple(self.scene.lighting.up)
         if up != self._up:
             # The environment stands up with the camera: every cube map shows it.
@@ -134,9 +150,10 @@ class EnvironmentMap(Method):
             if entry.index not in self._cubes:
                 self._cubes[entry.index] = self._draw_cube(entry, stats)
             with stats.stage("shade", device):
-                inputs = [rays, entry.index, self._cubes[entry.index], self.config.resolution, radiance]
-                launch.launch(reflect_cube, n, inputs, device)
-        return Reflection(radiance)
+                inputs = [pixels, gbuffer.view, self.scene.records, entry.index, self._cubes[entry.index]]
+                inputs += [self.config.resolution, radiance]
+                launch.launch(reflect_cube, pixels.shape[0], inputs, device)
+        return radiance
 
     def _take_memory(self, cubes: int) -> None:
         """Ask for what so many more cube maps need, once for each reflector."""
@@ -149,9 +166,11 @@ class EnvironmentMap(Method):
     def _draw_cube(self, reflector: DeviceObject, stats: Stats) -> wp.array:
         """(6 * resolution^2,) vec3 radiance about the reflector's centre, face by face, row by row."""
         shadows = self.scene.scene.lighting.shadows
-        shadow = self._trees.bound(self.scene, stats) if shadows else no_shadows(self.scene.device)
+        shadow = no_shadows(self.scene.device)
+        if shadows:
+            shadow = self.tracer.bound(self.scene, {entry.index for entry in self.scene.objects}, stats)
         eye = reflector.world_from_unit[:3, 3]
-        size = max(reflector.longest_side, 1e-6 * float(np.abs(eye).max()))
+        size = max(reflector.longest_side, LEAST_SIZE * float(np.abs(eye).max()))
         faces = []
         with stats.stage("cubemap", self.scene.device):
             for face in range(6):
@@ -166,5 +185,5 @@ class EnvironmentMap(Method):
                     height=self.config.resolution,
                 )
                 for seen in draw_in_bands(self.scene, camera, without=reflector.index):
-                    faces.append(shade_gbuffer(seen, shadow).radiance.numpy())
+                    faces.append(shade_gbuffer(seen, shadow, starts_rays=False).radiance.numpy())
         return wp.array(np.concatenate(faces), dtype=wp.vec3, device=self.scene.device)

@@ -1,30 +1,22 @@
-"""Ray against BVH (``wp.Mesh``): the ground truth.
+"""The ray caster: rays against a BVH over a mesh's triangles (``wp.Mesh``). It is the ground truth.
 
-Warp walks a SAH-built BVH and tests triangles by Woop, Benthin and Wald's watertight intersection (2013).
+Warp walks a BVH built by the surface area heuristic, and tests triangles by the watertight intersection of Woop,
+Benthin and Wald (2013).
 """
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import warp as wp
+from numpy.typing import ArrayLike
 
 from ldtrefl.device import launch
 from ldtrefl.geometry.vectors import as_single, point_along
 from ldtrefl.scene.mesh import Mesh
+from ldtrefl.tracing.batch import Hits, RayArray, occluded_batch, trace_batch
 from ldtrefl.tracing.hit import Hit, no_hit
-from ldtrefl.tracing.outlier_hits import first_outlier_hit
-from ldtrefl.tracing.trace import (
-    Hits,
-    Query,
-    Tracer,
-    any_one_by_one,
-    array_of_views,
-    occluded_batch,
-    one_by_one,
-    trace_batch,
-)
+from ldtrefl.tracing.outlier_hits import is_outlier_met, merge_outliers
+from ldtrefl.tracing.tracer import Query, Tracer, array_of_views
 from ldtrefl.world.device_mesh import DeviceMesh
 from ldtrefl.world.outliers import Outliers
 from ldtrefl.world.unit_rays import SPHERE, distance_passed
@@ -34,13 +26,13 @@ from ldtrefl.world.unit_rays import SPHERE, distance_passed
 class BvhView:
     """A mesh with its BVH."""
 
-    mesh: wp.uint64  # without the outliers
+    mesh: wp.uint64  # the ``wp.Mesh`` without the outliers
     outliers: Outliers
 
 
 @wp.func
-def closest_hit_bvh(views: wp.array(dtype=BvhView), index: int, query: Query) -> Hit:
-    """The tracer's closest hit of a ray."""
+def closest_hit_in_bulk(views: wp.array(dtype=BvhView), index: int, query: Query) -> Hit:
+    """What a ray meets first, outliers left out."""
     hit = no_hit()
     if query.t_max > 0.0:
         passed = distance_passed(query.origin, query.direction, SPHERE)
@@ -57,8 +49,20 @@ def closest_hit_bvh(views: wp.array(dtype=BvhView), index: int, query: Query) ->
 
 
 @wp.func
+def closest_hits_bvh(
+    views: wp.array(dtype=BvhView), index: int, queries: wp.array(dtype=Query), count: int, hits: wp.array(dtype=Hit)
+):
+    """The tracer's ``closest_hits``."""
+    for i in range(count):
+        hits[i] = closest_hit_in_bulk(views, index, queries[i])
+    merge_outliers(views[index].outliers, queries, count, hits)
+
+
+@wp.func
 def occluded_bvh(views: wp.array(dtype=BvhView), index: int, query: Query, outwards: wp.vec3) -> bool:
-    """The tracer's ``occluded``; a ray that leaves the mesh starts above its own triangle."""
+    """The tracer's ``occluded``: a ray that leaves the mesh starts above its own triangle, and needs nothing else."""
+    if is_outlier_met(views[index].outliers, query):
+        return True
     if not query.t_max > 0.0:
         return False
     passed = distance_passed(query.origin, query.direction, SPHERE)
@@ -67,34 +71,21 @@ def occluded_bvh(views: wp.array(dtype=BvhView), index: int, query: Query, outwa
 
 
 @wp.func
-def outlier_hit_bvh(
-    views: wp.array(dtype=BvhView), index: int, origin: wp.vec3d, direction: wp.vec3, t_max: float
-) -> Hit:
-    """The tracer's ``outlier_hit``."""
-    return first_outlier_hit(views[index].outliers, origin, direction, t_max)
+def any_hits_bvh(
+    views: wp.array(dtype=BvhView), index: int, queries: wp.array(dtype=Query), count: int, hits: wp.array(dtype=Hit)
+):
+    """The tracer's ``any_hits``."""
+    for i in range(count):
+        hits[i].triangle = wp.where(occluded_bvh(views, index, queries[i], wp.vec3(0.0)), 0, -1)
 
 
-@wp.func
-def outlier_count_bvh(views: wp.array(dtype=BvhView), index: int) -> int:
-    """The tracer's ``outlier_count``."""
-    return views[index].outliers.triangles.shape[0]
-
-
-BVH = Tracer(
-    "bvh",
-    BvhView,
-    one_by_one(closest_hit_bvh, BvhView),
-    any_one_by_one(occluded_bvh, BvhView),
-    occluded_bvh,
-    outlier_hit_bvh,
-    outlier_count_bvh,
-)
+BVH = Tracer("bvh", BvhView, closest_hits_bvh, any_hits_bvh, occluded_bvh)
 
 
 class Raycaster:
     """First hits of rays on a mesh, by BVH. The same ``trace`` as a layered depth texture's."""
 
-    def __init__(self, vertices: Any, faces: Any, device: str | None = None) -> None:
+    def __init__(self, vertices: ArrayLike, faces: ArrayLike, device: str | None = None) -> None:
         """Build the BVH.
 
         Args:
@@ -124,13 +115,13 @@ class Raycaster:
             faces = wp.array(rest, dtype=wp.vec3i, device=faces.device)
         self._mesh = wp.Mesh(geometry.vertices, faces.view(wp.int32).flatten())
 
-    def view(self) -> Any:
+    def view(self) -> BvhView:
         """The ``BvhView`` for kernels."""
         view = BvhView()
         view.mesh, view.outliers = self._mesh.id, self.geometry.outliers
         return view
 
-    def trace(self, origins: Any, directions: Any, t_max: Any = None) -> Hits:
+    def trace(self, origins: RayArray, directions: RayArray, t_max: RayArray | None = None) -> Hits:
         """First hits of rays given in object space.
 
         Args:
@@ -143,7 +134,7 @@ class Raycaster:
         """
         return trace_batch(BVH, self._views(), self.geometry, origins, directions, t_max)
 
-    def occluded(self, origins: Any, directions: Any, t_max: Any = None) -> Any:
+    def occluded(self, origins: RayArray, directions: RayArray, t_max: RayArray | None = None) -> np.ndarray | wp.array:
         """(...) bool: whether rays meet the mesh at all; arguments and errors as :meth:`trace` has them."""
         return occluded_batch(BVH, self._views(), self.geometry, origins, directions, t_max)
 

@@ -7,6 +7,7 @@ import warp as wp
 from ldtrefl.device.native_sources import native_body
 from ldtrefl.geometry.vectors import as_double, as_single
 from ldtrefl.tracing.hit import Hit, no_hit
+from ldtrefl.tracing.tracer import Query
 from ldtrefl.world.outliers import BOX_MARGIN, Outliers, OutlierTriangle
 
 NEGLIGIBLE = 1.0e-30
@@ -81,3 +82,35 @@ def first_outlier_hit(outliers: Outliers, origin: wp.vec3d, direction: wp.vec3, 
                     if one.triangle >= 0:
                         hit = one
     return hit
+
+
+@wp.func
+def merge_outliers(outliers: Outliers, queries: wp.array(dtype=Query), count: int, hits: wp.array(dtype=Hit)):
+    """Let what rays meet far outside the bulk count, too, where it is nearer than what they have met there."""
+    if outliers.triangles.shape[0] > 0:
+        for i in range(count):
+            t_max = queries[i].t_max
+            if hits[i].triangle >= 0:
+                t_max = hits[i].t
+            outlier = first_outlier_hit(outliers, queries[i].origin, queries[i].direction, t_max)
+            if outlier.triangle >= 0:
+                outlier.steps = hits[i].steps
+                hits[i] = outlier
+
+
+@wp.func
+def add_outliers_met(outliers: Outliers, queries: wp.array(dtype=Query), count: int, hits: wp.array(dtype=Hit)):
+    """Of rays that meet nothing else, find whether they meet something far outside the bulk."""
+    if outliers.triangles.shape[0] > 0:
+        for i in range(count):
+            if hits[i].triangle < 0:
+                outlier = first_outlier_hit(outliers, queries[i].origin, queries[i].direction, queries[i].t_max)
+                hits[i].triangle = outlier.triangle
+
+
+@wp.func
+def is_outlier_met(outliers: Outliers, query: Query) -> bool:
+    """Whether a ray meets something far outside the bulk."""
+    if outliers.triangles.shape[0] == 0:
+        return False
+    return first_outlier_hit(outliers, query.origin, query.direction, query.t_max).triangle >= 0

@@ -121,12 +121,12 @@ class DeviceScene:
         firsts = np.cumsum([0, *counts])
         return wp.array(firsts[:-1].astype(np.int32), dtype=wp.int32, device=self.device), int(firsts[-1])
 
-    def moved_since(self, before: DeviceScene) -> set[int] | None:
+    def moved_since(self, before: DeviceScene) -> frozenset[int] | None:
         """Numbers of the objects that have moved since a scene that this one comes from; None if all may look different
         in device space, because it is another one."""
         if not np.array_equal(self.device_from_world, before.device_from_world):
             return None
-        return {now.index for now, then in zip(self.objects, before.objects, strict=True) if now is not then}
+        return frozenset(now.index for now, then in zip(self.objects, before.objects, strict=True) if now is not then)
 
     def look_from(self, camera: Camera) -> None:
         """Turn the environment to the camera's ``up``. The owner of the scene does so before every frame, and makes one

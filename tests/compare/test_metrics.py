@@ -9,7 +9,7 @@ import warp as wp
 
 from ldtrefl.compare import metrics
 from ldtrefl.compare.metrics import hit_errors, reprojection_errors
-from ldtrefl.frame.reflect import FirstHits
+from ldtrefl.frame.first_hits import FirstHits
 from ldtrefl.renderer import Renderer
 from ldtrefl.scene.description import Camera, Material, Object, Scene
 

@@ -5,8 +5,6 @@ from pathlib import Path
 
 import pytest
 import warp as wp
-
-from ldtrefl.device import launch
 from ldtrefl.frame.reflect import (
     NOTHING,
     closest_hits_kernel,
@@ -14,10 +12,12 @@ from ldtrefl.frame.reflect import (
     shade_pixels_kernel,
     shade_reflectors_kernel,
 )
+from ldtrefl.tracing.trace import batch_kernel
+
+from ldtrefl.device import launch
 from ldtrefl.ldt.searches import TRACERS
 from ldtrefl.renderer import Renderer  # noqa: F401  (imports every module that defines kernels)
 from ldtrefl.tracing.bvh import BVH
-from ldtrefl.tracing.trace import batch_kernel
 
 
 def all_kernels() -> list[wp.Kernel]:

@@ -18,8 +18,9 @@ from ldtrefl.ldt.exact.tree import TreeView
 from ldtrefl.ldt.exact.walk import CONSTANTS, FILES, SEARCH, TREE
 from ldtrefl.ldt.linear import march
 from ldtrefl.scene import shapes
+from ldtrefl.tracing.batch import trace_batch
 from ldtrefl.tracing.hit import Hit
-from ldtrefl.tracing.trace import Query, array_of_views, trace_batch
+from ldtrefl.tracing.tracer import Query, array_of_views
 
 SHIM = """
 #include <cmath>

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 import warp as wp
+from ldtrefl.tracing.rays import RUN, RayBuffer
 
 import ldtrefl
 from ldtrefl.device import launch
 from ldtrefl.frame.regions import cull_runs, shows_flat
 from ldtrefl.scene.description import Camera, Material, Object, Scene
-from ldtrefl.tracing.rays import RUN, RayBuffer
 from ldtrefl.world.records import ObjectRecord
 from tests.conftest import SCENES
 

@@ -8,7 +8,8 @@ import warp as wp
 from ldtrefl.device import launch
 from ldtrefl.frame import skips
 from ldtrefl.scene.description import Camera, Light, Material, Object, Scene
-from ldtrefl.tracing.trace import Tracer, array_of_views, batch_kernel, block_of
+from ldtrefl.tracing.batch import batch_kernel
+from ldtrefl.tracing.tracer import Tracer, array_of_views, block_of
 
 ROOT = Path(__file__).parent.parent.parent
 

@@ -13,7 +13,7 @@ from ldtrefl.device import launch
 from ldtrefl.ldt.exact.record_choice import Quality
 from ldtrefl.ldt.searches import TRACERS
 from ldtrefl.tracing.bvh import BVH
-from ldtrefl.tracing.trace import Tracer
+from ldtrefl.tracing.tracer import Tracer
 
 from .common import Batch
 from .ray_tracer import RayTracer

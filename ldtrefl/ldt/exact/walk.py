@@ -15,8 +15,8 @@ from ldtrefl.geometry.triangle import barycentrics_at
 from ldtrefl.geometry.vectors import as_single, point_along
 from ldtrefl.ldt.exact.tree import NODE, STACK, TreeView
 from ldtrefl.tracing.hit import Hit
-from ldtrefl.tracing.outlier_hits import first_outlier_hit
-from ldtrefl.tracing.trace import RAY_BLOCK, Query, Tracer
+from ldtrefl.tracing.outlier_hits import add_outliers_met, is_outlier_met, merge_outliers
+from ldtrefl.tracing.tracer import RAY_BLOCK, Query, Tracer
 from ldtrefl.world.unit_rays import NEAR
 
 BOX_SLACK = 1.0e-6
@@ -179,17 +179,27 @@ def closest_hits_exact(
                 uv = coordinates_under_patch(views[index], hits[i].triangle, queries[i], hits[i].t)
                 hits[i].u = uv[0]
                 hits[i].v = uv[1]
+    merge_outliers(views[index].outliers, queries, count, hits)
+
+
+@wp.func
+def any_hits_in_bulk(
+    views: wp.array(dtype=TreeView), index: int, queries: wp.array(dtype=Query), count: int, hits: wp.array(dtype=Hit)
+):
+    """Whether rays meet the bulk. The first hit on a patch may be in doubt, and not count."""
+    if views[index].half_patch > 0.0 and views[index].front != 0.0:
+        search_tree(views, index, queries, count, hits)
+    else:
+        search_tree_for_any(views, index, queries, count, hits)
 
 
 @wp.func
 def any_hits_exact(
     views: wp.array(dtype=TreeView), index: int, queries: wp.array(dtype=Query), count: int, hits: wp.array(dtype=Hit)
 ):
-    """The tracer's ``any_hits``. The first hit on a patch may be in doubt, and not count."""
-    if views[index].half_patch > 0.0 and views[index].front != 0.0:
-        search_tree(views, index, queries, count, hits)
-    else:
-        search_tree_for_any(views, index, queries, count, hits)
+    """The tracer's ``any_hits``."""
+    any_hits_in_bulk(views, index, queries, count, hits)
+    add_outliers_met(views[index].outliers, queries, count, hits)
 
 
 @wp.func
@@ -205,13 +215,15 @@ def occluded_exact(views: wp.array(dtype=TreeView), index: int, query: Query, ou
     A ray may start under the patches that stand for its own surface. It then passes through them from within, close to
     its start: those are not met.
     """
+    if is_outlier_met(views[index].outliers, query):
+        return True
     query_room, hit_room = wp.zeros(shape=1, dtype=Query), wp.zeros(shape=1, dtype=Hit)
     queries = wp.array(ptr=query_room.ptr, shape=(1,), dtype=Query)
     hits = wp.array(ptr=hit_room.ptr, shape=(1,), dtype=Hit)
     queries[0] = query
     side = 2.0 * views[index].half_patch
     if side == 0.0 or outwards == wp.vec3(0.0):
-        any_hits_exact(views, index, queries, 1, hits)
+        any_hits_in_bulk(views, index, queries, 1, hits)
         return hits[0].triangle >= 0
     passed = float(0.0)
     while passed <= OWN_PATCHES * side:
@@ -225,24 +237,8 @@ def occluded_exact(views: wp.array(dtype=TreeView), index: int, query: Query, ou
         passed += hits[0].t + OWN_STEP * views[index].half_patch
     queries[0].origin = point_along(query.origin, query.direction, passed)
     queries[0].t_max = query.t_max - passed
-    any_hits_exact(views, index, queries, 1, hits)
+    any_hits_in_bulk(views, index, queries, 1, hits)
     return hits[0].triangle >= 0
 
 
-@wp.func
-def outlier_hit_exact(
-    views: wp.array(dtype=TreeView), index: int, origin: wp.vec3d, direction: wp.vec3, t_max: float
-) -> Hit:
-    """The tracer's ``outlier_hit``."""
-    return first_outlier_hit(views[index].outliers, origin, direction, t_max)
-
-
-@wp.func
-def outlier_count_exact(views: wp.array(dtype=TreeView), index: int) -> int:
-    """The tracer's ``outlier_count``."""
-    return views[index].outliers.triangles.shape[0]
-
-
-EXACT = Tracer(
-    "exact", TreeView, closest_hits_exact, any_hits_exact, occluded_exact, outlier_hit_exact, outlier_count_exact
-)
+EXACT = Tracer("exact", TreeView, closest_hits_exact, any_hits_exact, occluded_exact)

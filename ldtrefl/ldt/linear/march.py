@@ -33,7 +33,7 @@ from ldtrefl.geometry.vectors import as_double, as_single, point_along
 from ldtrefl.ldt.fragments import ONE_A_TEXEL, LdtView, triangle_of
 from ldtrefl.ldt.linear.occupancy import LEVEL_SHIFT
 from ldtrefl.tracing.hit import Hit, no_hit
-from ldtrefl.tracing.trace import Query, Tracer, any_one_by_one, one_by_one
+from ldtrefl.tracing.tracer import Query, Tracer
 from ldtrefl.world.unit_rays import NEAR, distance_passed
 
 BOX_MARGIN = wp.constant(0.01)
@@ -217,25 +217,21 @@ def occluded_linear(views: wp.array(dtype=LdtView), index: int, query: Query, ou
 
 
 @wp.func
-def no_outlier_linear(
-    views: wp.array(dtype=LdtView), index: int, origin: wp.vec3d, direction: wp.vec3, t_max: float
-) -> Hit:
-    """The tracer's ``outlier_hit``: the maps hold all triangles."""
-    return no_hit()
+def closest_hits_linear(
+    views: wp.array(dtype=LdtView), index: int, queries: wp.array(dtype=Query), count: int, hits: wp.array(dtype=Hit)
+):
+    """The tracer's ``closest_hits``: the maps hold all triangles, outliers too."""
+    for i in range(count):
+        hits[i] = closest_hit_linear(views, index, queries[i])
 
 
 @wp.func
-def outlier_count_linear(views: wp.array(dtype=LdtView), index: int) -> int:
-    """The tracer's ``outlier_count``."""
-    return 0
+def any_hits_linear(
+    views: wp.array(dtype=LdtView), index: int, queries: wp.array(dtype=Query), count: int, hits: wp.array(dtype=Hit)
+):
+    """The tracer's ``any_hits``."""
+    for i in range(count):
+        hits[i].triangle = wp.where(occluded_linear(views, index, queries[i], wp.vec3(0.0)), 0, -1)
 
 
-LINEAR = Tracer(
-    "linear",
-    LdtView,
-    one_by_one(closest_hit_linear, LdtView),
-    any_one_by_one(occluded_linear, LdtView),
-    occluded_linear,
-    no_outlier_linear,
-    outlier_count_linear,
-)
+LINEAR = Tracer("linear", LdtView, closest_hits_linear, any_hits_linear, occluded_linear)

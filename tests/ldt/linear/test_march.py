@@ -11,7 +11,7 @@ from ldtrefl.device import launch
 from ldtrefl.ldt.fragments import LdtView
 from ldtrefl.ldt.linear.march import march_linear
 from ldtrefl.ldt.texture import LayeredDepthTexture
-from ldtrefl.tracing.trace import array_of_views
+from ldtrefl.tracing.tracer import array_of_views
 
 from .reference import LinearReference
 

@@ -1,147 +1,41 @@
-"""What a tracer is, and tracing a batch of rays with one.
+"""Batches of rays against one object, as users of the library ask for them.
 
-A *tracer* answers rays against single objects inside kernels: Warp functions over an array of *views*, one view per
-object. Rays come in blocks, so that a tracer may search for them together. Kernels that trace are built from a tracer,
-so everything above it (bounces, shadows, shading, counters) exists once for the layered depth texture and for the BVH.
-
-A tracer works in the object's unit space. A miss is ``t = +inf`` and triangle -1.
+Rays are given in the object's own coordinates, with directions of any length. They are brought into its unit space,
+searched for in blocks, and the answers brought back.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import warp as wp
+from numpy.typing import ArrayLike
 
 from ldtrefl.base.errors import InputError
-from ldtrefl.device import launch, warp_abi
+from ldtrefl.device import launch
 from ldtrefl.device.native_sources import native_body
 from ldtrefl.geometry.triangle import ONE_THIRD
 from ldtrefl.tracing.hit import Hit
+from ldtrefl.tracing.tracer import Query, Tracer, block_of
 from ldtrefl.world.device_mesh import DeviceMesh
 
-RAY_BLOCK = wp.constant(64)
-"""Rays that are searched for together on the CPU: as many as a block of 8 x 8 pixels has."""
-
-
-@wp.struct
-class Query:
-    """A ray that is searched for in an object, in its unit space: hits at ``0 <= t < t_max`` count."""
-
-    origin: wp.vec3d
-    direction: wp.vec3  # about as long as 1; t is in lengths of it
-    t_max: float
-
-
-@dataclass(frozen=True)
-class Tracer:
-    """Warp functions and the type of the views that they read.
-
-    ``closest_hits(views, index, queries, count, hits)``: the first hits of up to ``RAY_BLOCK`` rays on object
-    ``index``; of misses t and the triangle are set.
-    ``any_hits``, the same: whether rays meet anything, by the triangle in ``hits``, which may be any then.
-    ``occluded(views, index, query, outwards) -> bool``: whether one ray does. ``outwards`` is 0 but for a ray that
-    leaves the object's own surface: it is the unit normal there, on the ray's side, and what the tracer takes for that
-    surface is not met.
-    ``outlier_hit(views, index, origin, direction, t_max) -> Hit``: for what lies far outside the object's bulk; the
-    origin is float64 and may lie anywhere. ``outlier_count(views, index) -> int``: how much does.
-    """
-
-    name: str
-    view: Any
-    closest_hits: Any
-    any_hits: Any
-    occluded: Any
-    outlier_hit: Any
-    outlier_count: Any
-
-
-def one_by_one(closest_hit: Any, view: Any) -> Any:
-    """``closest_hits`` by a ``closest_hit(views, index, query) -> Hit``."""
-
-    @wp.func
-    def closest_hits(
-        views: wp.array(dtype=view), index: int, queries: wp.array(dtype=Query), count: int, hits: wp.array(dtype=Hit)
-    ):
-        for i in range(count):
-            hits[i] = closest_hit(views, index, queries[i])
-
-    return closest_hits
-
-
-def any_one_by_one(occluded: Any, view: Any) -> Any:
-    """``any_hits`` by an ``occluded``."""
-
-    @wp.func
-    def any_hits(
-        views: wp.array(dtype=view), index: int, queries: wp.array(dtype=Query), count: int, hits: wp.array(dtype=Hit)
-    ):
-        for i in range(count):
-            hits[i].triangle = wp.where(occluded(views, index, queries[i], wp.vec3(0.0)), 0, -1)
-
-    return any_hits
+RayArray = ArrayLike | wp.array
+"""Numbers of shape (..., 3), or a Warp array of them."""
 
 
 @dataclass(frozen=True)
 class Hits:
-    """Answers to a batch of n rays, as numpy arrays if the rays were, else as Warp arrays."""
+    """Answers to a batch of rays of shape (..., 3): numpy arrays, or Warp arrays if the rays were."""
 
-    t: Any
-    """(n,) float32, in lengths of each ray's direction; +inf on a miss."""
-    normal: Any
-    """(n, 3) float32 unit facet normal by the triangle's winding; 0 on a miss."""
-    triangle: Any
-    """(n,) int32; -1 on a miss."""
-    barycentrics: Any
-    """(n, 2) float32 weights of the triangle's second and third corner."""
+    t: np.ndarray | wp.array
+    """(...) float32, in lengths of each ray's direction; +inf on a miss."""
+    normal: np.ndarray | wp.array
+    """(..., 3) float32 unit facet normal by the triangle's winding; 0 on a miss."""
+    triangle: np.ndarray | wp.array
+    """(...) int32; -1 on a miss."""
+    barycentrics: np.ndarray | wp.array
+    """(..., 2) float32 weights of the triangle's second and third corner."""
     invalid: int
     """Rays that were not finite or had no direction; they count as misses."""
-
-
-def array_of_views(views: Sequence[Any], view: Any, device: wp.Device) -> wp.array:
-    """Views of objects as an array that kernels read. Whoever keeps the array keeps the views, too."""
-    return warp_abi.array_of_structs(views, view, device)
-
-
-@launch.once
-def outlier_merger(tracer: Tracer) -> Any:
-    """``merge(views, index, queries, count, hits)``: what rays meet far outside the bulk counts, too."""
-    outlier_hit, outlier_count = tracer.outlier_hit, tracer.outlier_count
-
-    @wp.func
-    def merge(views: Any, index: int, queries: wp.array(dtype=Query), count: int, hits: wp.array(dtype=Hit)):
-        if outlier_count(views, index) > 0:
-            for i in range(count):
-                t_max = queries[i].t_max
-                if hits[i].triangle >= 0:
-                    t_max = hits[i].t
-                outlier = outlier_hit(views, index, queries[i].origin, queries[i].direction, t_max)
-                if outlier.triangle >= 0:
-                    outlier.steps = hits[i].steps
-                    hits[i] = outlier
-
-    return merge
-
-
-@launch.once
-def occluded_of(tracer: Tracer) -> Any:
-    """``is_blocked(views, index, query, outwards) -> bool``: the tracer's ``occluded``, outliers counted."""
-    occluded, outlier_hit, outlier_count = tracer.occluded, tracer.outlier_hit, tracer.outlier_count
-
-    @wp.func
-    def is_blocked(views: Any, index: int, query: Query, outwards: wp.vec3) -> bool:
-        if outlier_count(views, index) > 0:
-            if outlier_hit(views, index, query.origin, query.direction, query.t_max).triangle >= 0:
-                return True
-        return occluded(views, index, query, outwards)
-
-    return is_blocked
-
-
-def block_of(device: wp.Device) -> int:
-    """Rays that one item of a kernel searches for."""
-    return int(RAY_BLOCK) if device.is_cpu else 1
 
 
 FILES = ("device/vectors.h", "tracing/ray_batch.h")
@@ -216,7 +110,7 @@ def batch_kernel(tracer: Tracer, block: int, only_whether: bool = False) -> wp.K
     """The kernel that traces rays given in object space, ``block`` of them an item; or that finds ``only_whether`` they
     meet anything, by the number of the triangle, which may be any then."""
     find_hits = tracer.any_hits if only_whether else tracer.closest_hits
-    merge_outliers, size = outlier_merger(tracer), wp.constant(block)
+    size = wp.constant(block)
 
     @launch.kernel
     def trace_batch(
@@ -246,7 +140,6 @@ def batch_kernel(tracer: Tracer, block: int, only_whether: bool = False) -> wp.K
         scales = wp.array(ptr=scale_room.ptr, shape=(size,), dtype=wp.float32)
         invalid = start_queries(origins, directions, t_max, begin, count, centre, per_half, queries, scales)
         find_hits(views, 0, queries, count, hits)
-        merge_outliers(views, 0, queries, count, hits)
         if t_out.shape[0] > 0:
             write_hits(hits, scales, per_half, begin, count, t_out, normal_out, triangle_out, barycentrics_out)
         else:
@@ -258,7 +151,12 @@ def batch_kernel(tracer: Tracer, block: int, only_whether: bool = False) -> wp.K
 
 
 def trace_batch(
-    tracer: Tracer, views: wp.array, geometry: DeviceMesh, origins: Any, directions: Any, t_max: Any = None
+    tracer: Tracer,
+    views: wp.array,
+    geometry: DeviceMesh,
+    origins: RayArray,
+    directions: RayArray,
+    t_max: RayArray | None = None,
 ) -> Hits:
     """Trace rays, given in the object's own coordinates, against one object.
 
@@ -271,27 +169,35 @@ def trace_batch(
         InputError: the arrays' shapes do not fit, or they hold no numbers.
     """
     rays = _Rays(origins, directions, t_max, geometry.vertices.device)
-    hits = _traced(tracer, views, geometry.mesh.unit_frame, rays)
+    found = _traced(tracer, views, geometry.mesh.unit_frame, rays)
     if isinstance(origins, wp.array):
-        return hits
+        return Hits(*found.arrays, found.invalid)
+    t, normal, triangle, barycentrics = (array.numpy() for array in found.arrays)
     shape = rays.shape
     return Hits(
-        hits.t.numpy().reshape(shape),
-        hits.normal.numpy().reshape(*shape, 3),
-        hits.triangle.numpy().reshape(shape),
-        hits.barycentrics.numpy().reshape(*shape, 2),
-        hits.invalid,
+        t.reshape(shape),
+        normal.reshape(*shape, 3),
+        triangle.reshape(shape),
+        barycentrics.reshape(*shape, 2),
+        found.invalid,
     )
 
 
 def trace_in_unit_space(tracer: Tracer, views: wp.array, origins: wp.array, directions: wp.array) -> Hits:
-    """:func:`trace_batch` for Warp arrays of rays in the object's unit space."""
-    return _traced(tracer, views, (np.zeros(3), 1.0), _Rays(origins, directions, None, origins.device))
+    """:func:`trace_batch` for Warp arrays of rays in the object's unit space; the answers are numpy arrays."""
+    found = _traced(tracer, views, (np.zeros(3), 1.0), _Rays(origins, directions, None, origins.device))
+    t, normal, triangle, barycentrics = (array.numpy() for array in found.arrays)
+    return Hits(t, normal, triangle, barycentrics, found.invalid)
 
 
 def occluded_batch(
-    tracer: Tracer, views: wp.array, geometry: DeviceMesh, origins: Any, directions: Any, t_max: Any = None
-) -> Any:
+    tracer: Tracer,
+    views: wp.array,
+    geometry: DeviceMesh,
+    origins: RayArray,
+    directions: RayArray,
+    t_max: RayArray | None = None,
+) -> np.ndarray | wp.array:
     """Whether rays meet an object at all; arguments and errors as :func:`trace_batch` has them.
 
     Returns:
@@ -309,7 +215,7 @@ def occluded_batch(
 class _Rays:
     """Rays as a user gives them, on a device."""
 
-    def __init__(self, origins: Any, directions: Any, t_max: Any, device: wp.Device) -> None:
+    def __init__(self, origins: RayArray, directions: RayArray, t_max: RayArray | None, device: wp.Device) -> None:
         self.origins, self.shape = _ray_array(origins, "origins", device)
         self.directions, other = _ray_array(directions, "directions", device)
         if self.shape != other:
@@ -318,12 +224,21 @@ class _Rays:
         self.t_max = _limits(t_max, self.shape, device)
 
 
-def _traced(tracer: Tracer, views: wp.array, unit_frame: tuple[np.ndarray, float], rays: _Rays) -> Hits:
+@dataclass(frozen=True)
+class _Found:
+    """Answers to rays, on their device."""
+
+    arrays: tuple[wp.array, wp.array, wp.array, wp.array]
+    """t, normal, triangle and barycentrics, as in ``Hits``."""
+    invalid: int
+
+
+def _traced(tracer: Tracer, views: wp.array, unit_frame: tuple[np.ndarray, float], rays: _Rays) -> _Found:
     n, device = rays.count, rays.origins.device
     t, triangle = wp.empty(n, dtype=float, device=device), wp.empty(n, dtype=int, device=device)
     normal, barycentrics = wp.empty(n, dtype=wp.vec3, device=device), wp.empty(n, dtype=wp.vec2, device=device)
     invalid = _launch_batch(tracer, views, unit_frame, rays, [t, normal, triangle, barycentrics])
-    return Hits(t, normal, triangle, barycentrics, invalid)
+    return _Found((t, normal, triangle, barycentrics), invalid)
 
 
 def _launch_batch(
@@ -345,7 +260,7 @@ def _launch_batch(
     return int(invalid.numpy().sum())
 
 
-def _limits(t_max: Any, shape: tuple[int, ...], device: wp.Device) -> wp.array:
+def _limits(t_max: RayArray | None, shape: tuple[int, ...], device: wp.Device) -> wp.array:
     """(n,), (1,) or, where there are none, (0,) float32."""
     if t_max is None:
         return wp.empty(0, dtype=float, device=device)
@@ -361,7 +276,7 @@ def _limits(t_max: Any, shape: tuple[int, ...], device: wp.Device) -> wp.array:
     return wp.array(limits.reshape(-1), dtype=float, device=device)
 
 
-def _ray_array(rays: Any, name: str, device: wp.Device) -> tuple[wp.array, tuple[int, ...]]:
+def _ray_array(rays: RayArray, name: str, device: wp.Device) -> tuple[wp.array, tuple[int, ...]]:
     """(n,) vec3 on the device, and the shape that the rays were given in, without their coordinates."""
     if isinstance(rays, wp.array):
         if rays.dtype is wp.vec3 and rays.ndim == 1:

@@ -1,0 +1,114 @@
+"""Shading what the camera sees, all but what reflectors reflect; and starting the reflected rays there."""
+
+from dataclasses import dataclass
+
+import warp as wp
+
+from ldtrefl.device import launch
+from ldtrefl.frame.gbuffer import GBuffer, GBufferView, pixel_surface, pixel_view
+from ldtrefl.frame.shadows import direct_radiance_of
+from ldtrefl.shading.environment import environment_radiance
+from ldtrefl.shading.specular import mirror_direction
+from ldtrefl.shading.surface import Surface
+from ldtrefl.tracing.ray_buffers import RayBuffer, empty_rays
+from ldtrefl.tracing.tracer import BoundTracer, Tracer
+from ldtrefl.world.camera import camera_ray
+from ldtrefl.world.records import LightingRecord
+from ldtrefl.world.records import ObjectRecord
+
+
+@launch.once
+def shade_pixels_kernel(tracer: Tracer) -> wp.Kernel:
+    """The kernel that shades what the camera sees, reflectors left out."""
+    direct_radiance = direct_radiance_of(tracer)
+
+    @launch.kernel
+    def shade_pixels(
+        first: int,
+        # In:
+        gbuffer: GBufferView,
+        objects: wp.array(dtype=ObjectRecord),
+        lighting: LightingRecord,
+        views: wp.array(dtype=tracer.view),
+        # Out:
+        radiance_out: wp.array(dtype=wp.vec3),
+    ):
+        """Shade one pixel, unless it sees a reflector."""
+        i = first + wp.tid()
+        if gbuffer.object[i] < 0:
+            x, y = float(i % gbuffer.camera.width) + 0.5, float(i / gbuffer.camera.width) + 0.5
+            radiance_out[i] = environment_radiance(lighting, wp.normalize(camera_ray(gbuffer.camera, x, y)))
+        elif gbuffer.reflector[i] == wp.uint8(0):
+            surface = pixel_surface(gbuffer, objects, i, pixel_view(gbuffer, objects, i))
+            radiance_out[i] = direct_radiance(views, objects, lighting, surface)
+
+    return shade_pixels
+
+
+@wp.func
+def start_ray(rays: RayBuffer, i: int, surface: Surface, direction: wp.vec3):
+    """Let ray ``i`` leave a surface that is seen along unit ``direction``, mirrored."""
+    rays.origin[i] = surface.position
+    rays.direction[i] = mirror_direction(direction, surface.normal)
+    rays.throughput[i] = wp.vec3(1.0)
+    rays.source[i] = surface.object
+    rays.source_triangle[i] = surface.triangle
+
+
+@launch.once
+def shade_reflectors_kernel(tracer: Tracer, starts_rays: bool) -> wp.Kernel:
+    """The kernel that shades the pixels that see a reflector, without what it reflects, and starts their rays if
+    ``starts_rays``."""
+    direct_radiance, with_rays = direct_radiance_of(tracer), wp.constant(starts_rays)
+
+    @launch.kernel
+    def shade_reflectors(
+        first: int,
+        # In:
+        pixels: wp.array(dtype=wp.int32),
+        gbuffer: GBufferView,
+        objects: wp.array(dtype=ObjectRecord),
+        lighting: LightingRecord,
+        views: wp.array(dtype=tracer.view),
+        # Out:
+        rays: RayBuffer,
+        radiance_out: wp.array(dtype=wp.vec3),
+        mirror_out: wp.array(dtype=wp.vec3),  # of each of the pixels
+    ):
+        """Shade one pixel that sees a reflector."""
+        i = first + wp.tid()
+        pixel = pixels[i]
+        view = pixel_view(gbuffer, objects, pixel)
+        surface = pixel_surface(gbuffer, objects, pixel, view)
+        radiance_out[pixel] = direct_radiance(views, objects, lighting, surface)
+        mirror_out[i] = surface.mirror
+        if with_rays:
+            rays.pixel[i] = pixel
+            start_ray(rays, i, surface, view.direction)
+
+    return shade_reflectors
+
+
+@dataclass(frozen=True, eq=False)
+class Shaded:
+    """What a camera sees, but for what reflectors reflect."""
+
+    radiance: wp.array
+    """(h * w,) vec3, reflections left out."""
+    mirror: wp.array
+    """(m,) vec3: specular reflectance in each of the G-buffer's ``reflector_pixels``."""
+    rays: RayBuffer
+    """The rays of the first reflection, one for each of those pixels and in their order; none if none are started."""
+
+
+def shade_gbuffer(gbuffer: GBuffer, shadow: BoundTracer, *, starts_rays: bool) -> Shaded:
+    """Shade every pixel with the shadows that ``shadow`` answers; start the rays of those that see a reflector."""
+    scene, device, pixels = gbuffer.scene, gbuffer.scene.device, gbuffer.reflector_pixels
+    radiance = wp.empty(gbuffer.pixel_count, dtype=wp.vec3, device=device)
+    inputs = [gbuffer.view, scene.records, scene.lighting, shadow.views]
+    launch.launch(shade_pixels_kernel(shadow.tracer), gbuffer.pixel_count, [*inputs, radiance], device)
+    count = pixels.shape[0]
+    mirror, rays = wp.empty(count, dtype=wp.vec3, device=device), empty_rays(count if starts_rays else 0, device)
+    kernel = shade_reflectors_kernel(shadow.tracer, starts_rays)
+    launch.launch(kernel, count, [pixels, *inputs, rays, radiance, mirror], device)
+    return Shaded(radiance, mirror, rays)

@@ -1,0 +1,136 @@
+"""What a frame may use again of the frames before it: the one owner of all that is kept from frame to frame.
+
+Whether the camera is the same, and which objects have moved, is decided here and nowhere else. While the camera stays,
+what stands still is drawn once and what moves is drawn over it; reflected rays that nothing has changed for are taken
+from the last frame (``refollow.py``); a frame in which nothing at all has changed is handed out again.
+
+What is kept changes at the end of a step and at once, so that a frame that is stopped on the way leaves no half of it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ldtrefl.frame.camera_shading import Shaded
+from ldtrefl.frame.gbuffer import GBuffer
+from ldtrefl.frame.reflected_light import ReflectedLight
+from ldtrefl.frame.visibility import draw_gbuffer, resolved
+from ldtrefl.frame.zbuffer import Drawing
+from ldtrefl.scene.description import Camera
+from ldtrefl.world.device_scene import DeviceScene
+
+
+@dataclass(frozen=True, eq=False)
+class FrameParts:
+    """What a frame, or a band of one, is composed of."""
+
+    gbuffer: GBuffer
+    shaded: Shaded
+    reflected: ReflectedLight
+    stages: tuple[str, ...]
+    """What was timed."""
+
+
+@dataclass(frozen=True, eq=False)
+class _View:
+    """A scene as it stood, and the camera that looked at it."""
+
+    scene: DeviceScene
+    camera: Camera
+
+    def moved(self, scene: DeviceScene, camera: Camera) -> frozenset[int] | None:
+        """The numbers of the objects that have moved since; None if the camera is another one."""
+        return scene.moved_since(self.scene) if camera == self.camera else None
+
+
+@dataclass(frozen=True, eq=False)
+class _Still:
+    """A drawing of what stood still for a while."""
+
+    view: _View
+    drawing: Drawing
+    moving: frozenset[int]
+    """The objects that are not in it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reusable:
+    """What a method may use again of the last frame, which the same camera saw."""
+
+    reflected: ReflectedLight
+    moved: frozenset[int]
+    """The numbers of the objects that have moved since."""
+
+
+class FrameHistory:
+    """What is kept of the frames of one renderer."""
+
+    def __init__(self, *, keeps: bool) -> None:
+        """Keep nothing between frames unless ``keeps``."""
+        self._keeps = keeps
+        self._view: _View | None = None
+        """Of the last frame."""
+        self._parts: FrameParts | None = None
+        """The last frame, if it was made as a whole."""
+        self._reflected: ReflectedLight | None = None
+        """What its rays met, for longer than the rest of it: the next frame may use that again."""
+        self._still: _Still | None = None
+
+    @property
+    def last_view(self) -> tuple[DeviceScene, Camera] | None:
+        """The scene and the camera of the last frame."""
+        return None if self._view is None else (self._view.scene, self._view.camera)
+
+    @property
+    def last_gbuffer(self) -> GBuffer | None:
+        """What the camera saw in the last frame; None if there is none, or it was made in bands."""
+        return None if self._parts is None else self._parts.gbuffer
+
+    def unchanged(self, scene: DeviceScene, camera: Camera) -> FrameParts | None:
+        """The last frame, if this one is the same."""
+        moved = self._moved(scene, camera)
+        return self._parts if moved is not None and not moved else None
+
+    def reusable(self, scene: DeviceScene, camera: Camera) -> Reusable | None:
+        """What a method may use again; None if the camera is another one, or all objects have moved."""
+        moved = self._moved(scene, camera)
+        if moved is None or self._reflected is None:
+            return None
+        return Reusable(self._reflected, moved)
+
+    def gbuffer(self, scene: DeviceScene, camera: Camera) -> GBuffer:
+        """What ``camera`` sees of a scene; the rest of the last frame is dropped, so that its memory is used again."""
+        everything = frozenset(range(len(scene.objects)))
+        moved = self._moved(scene, camera)
+        self._parts = None
+        if moved is None or moved == everything:
+            self._still = None
+            return draw_gbuffer(scene, camera)
+        still = self._still
+        moved_since_drawn = None if still is None else still.view.moved(scene, camera)
+        if still is None or moved_since_drawn is None or not moved_since_drawn <= still.moving:
+            drawing = Drawing.empty(scene, camera)
+            drawing.add(scene, camera, sorted(everything - moved))
+            still = self._still = _Still(_View(scene, camera), drawing, moved)
+        drawing = still.drawing.over()
+        drawing.add(scene, camera, sorted(still.moving))
+        return resolved(drawing, scene, camera)
+
+    def keep(self, scene: DeviceScene, camera: Camera, parts: FrameParts) -> None:
+        """Remember a frame that was made as a whole."""
+        self._view, self._parts, self._reflected = _View(scene, camera), parts, parts.reflected
+
+    def forget(self) -> None:
+        """Drop everything: the next frame is too large to be kept."""
+        self._view = self._parts = self._reflected = self._still = None
+
+    def keep_view(self, scene: DeviceScene, camera: Camera) -> None:
+        """Remember what was seen in a frame that was made in bands, and nothing else of it."""
+        self.forget()
+        self._view = _View(scene, camera)
+
+    def _moved(self, scene: DeviceScene, camera: Camera) -> frozenset[int] | None:
+        """The objects that have moved since the last frame; None if nothing of it can be used again."""
+        if not self._keeps or self._view is None:
+            return None
+        return self._view.moved(scene, camera)

@@ -1,0 +1,26 @@
+"""What a reflection method answers: the radiance that reaches each reflector pixel by way of the mirror."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import warp as wp
+
+from ldtrefl.frame.bounces import FollowedRays
+from ldtrefl.frame.first_hits import FirstHits
+from ldtrefl.world.device_mesh import DeviceMesh
+
+
+@dataclass(frozen=True, eq=False)
+class ReflectedLight:
+    """A method's answer."""
+
+    radiance: wp.array
+    """(m,) vec3: of each of the G-buffer's ``reflector_pixels``, before the reflector's own reflectance."""
+    hits: FirstHits | None = None
+    """Where the first rays ended, for methods that have rays."""
+    followed: FollowedRays | None = None
+    """Those rays, if the next frame may use them again."""
+    resolutions: Mapping[DeviceMesh, int] = field(default_factory=dict)
+    """Texels of the maps that they were searched for in, by mesh: rays are used again only with the same."""

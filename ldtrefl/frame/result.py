@@ -1,0 +1,152 @@
+"""``Frame``: a rendered image, and what is made of the rest only when it is asked for."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import warp as wp
+
+from ldtrefl.base import budget
+from ldtrefl.device.launch import Stats
+from ldtrefl.frame.composite import reflection_picture
+from ldtrefl.frame.first_hits import FirstHits
+from ldtrefl.frame.gbuffer import GBuffer
+from ldtrefl.frame.history import FrameParts
+from ldtrefl.tracing.ray_buffers import HitBuffer, RayBuffer, joined
+
+HIT_BYTES = 112
+"""Of a pixel that sees a reflector: its ray and where that ends, joined from all bands."""
+
+SMALLER = "camera.width or camera.height"
+"""What takes less memory."""
+
+
+class FrameSource(Protocol):
+    """What a frame gives beside its image, made when it is asked for."""
+
+    def reflection(self) -> np.ndarray:
+        """``Frame.reflection``."""
+
+    def reflector_mask(self) -> np.ndarray:
+        """``Frame.reflector_mask``."""
+
+    def hits(self) -> FirstHits | None:
+        """``Frame.hits``."""
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """A rendered image and what it cost. All arrays are the caller's: to write into them changes no other frame.
+
+    All but the image is made when it is first asked for. Of an image of more than 4 million pixels, ``reflection`` and
+    ``hits`` are rendered again, because to keep them would take more than the image does.
+
+    Raises:
+        InputError: ``reflection`` or ``hits`` of a large image need more memory than is allowed.
+    """
+
+    image: np.ndarray
+    """(h, w, 3) float32, linear radiance."""
+    stats: Stats
+    """``seconds`` per stage and ``counters``."""
+    _source: FrameSource
+
+    @functools.cached_property
+    def reflection(self) -> np.ndarray:
+        """(h, w, 3) float32: the reflected radiance alone, before the reflector's reflectance; 0 outside the mask."""
+        return self._source.reflection()
+
+    @functools.cached_property
+    def reflector_mask(self) -> np.ndarray:
+        """(h, w) bool: pixels that see a reflector."""
+        return self._source.reflector_mask()
+
+    @functools.cached_property
+    def hits(self) -> FirstHits | None:
+        """Where the first reflected rays ended; None for methods without rays."""
+        return self._source.hits()
+
+
+@dataclass(frozen=True, eq=False)
+class WholeFrame:
+    """The rest of a frame that was made as a whole. Arrays are copied: on the CPU ``numpy`` gives the memory that the
+    next frame may be made of."""
+
+    shape: tuple[int, int]
+    pixels: wp.array
+    """(m,) int32: the pixels that see a reflector."""
+    radiance: wp.array
+    """(m,) vec3: what is reflected there."""
+    reflector: wp.array
+    """(h * w,) uint8: 1 for those pixels."""
+    first_hits: FirstHits | None
+
+    @classmethod
+    def of(cls, parts: FrameParts) -> WholeFrame:
+        """What a frame needs of its parts: no more, so that the memory of the others is used again."""
+        gbuffer, reflected = parts.gbuffer, parts.reflected
+        return cls(gbuffer.shape, gbuffer.reflector_pixels, reflected.radiance, gbuffer.view.reflector, reflected.hits)
+
+    def reflection(self) -> np.ndarray:
+        """``Frame.reflection``."""
+        return reflection_picture(self.shape, self.pixels, self.radiance)
+
+    def reflector_mask(self) -> np.ndarray:
+        """``Frame.reflector_mask``."""
+        return np.array(self.reflector.numpy()).view(bool).reshape(self.shape)
+
+    def hits(self) -> FirstHits | None:
+        """``Frame.hits``: the frame's own, for they keep the pictures that they have been asked for."""
+        return None if self.first_hits is None else dataclasses.replace(self.first_hits)
+
+
+@dataclass(frozen=True, eq=False)
+class BandedFrame:
+    """The rest of a frame that was made in bands: they are rendered again, which gives the same bits."""
+
+    mask: np.ndarray
+    render_bands: Callable[[], Iterator[FrameParts]]
+
+    def reflection(self) -> np.ndarray:
+        """``Frame.reflection``."""
+        height, width = self.mask.shape
+        budget.take(12 * self.mask.size, f"the reflection in an image of {width} x {height} pixels", SMALLER)
+        picture = np.empty((height, width, 3), np.float32)
+        for parts in self.render_bands():
+            gbuffer = parts.gbuffer
+            pixels, radiance = gbuffer.reflector_pixels, parts.reflected.radiance
+            picture[rows_of(gbuffer)] = reflection_picture(gbuffer.shape, pixels, radiance)
+        return picture
+
+    def reflector_mask(self) -> np.ndarray:
+        """``Frame.reflector_mask``."""
+        return self.mask
+
+    def hits(self) -> FirstHits | None:
+        """``Frame.hits``."""
+        height, width = self.mask.shape
+        rays = f"the reflected rays of an image of {width} x {height} pixels"
+        budget.take(HIT_BYTES * int(np.count_nonzero(self.mask)), rays, SMALLER)
+        found = []
+        for parts in self.render_bands():
+            if parts.reflected.hits is None and parts.gbuffer.reflector_pixels.shape[0]:
+                return None
+            if parts.reflected.hits is not None:
+                found.append((parts.gbuffer.band.first_row * width, parts.reflected.hits))
+        if not found:
+            return None
+        together = joined(RayBuffer, [hits.rays for _, hits in found])
+        pixels = np.concatenate([first + hits.rays.pixel.numpy() for first, hits in found])
+        together.pixel = wp.array(pixels, dtype=wp.int32, device=together.origin.device)
+        ends = joined(HitBuffer, [hits.ends for _, hits in found])
+        return FirstHits((height, width), together, ends, found[0][1].device_units_per_world_unit)
+
+
+def rows_of(gbuffer: GBuffer) -> slice:
+    """The rows of the image that a band is."""
+    return slice(gbuffer.band.first_row, gbuffer.band.first_row + gbuffer.band.rows)

@@ -1,0 +1,125 @@
+"""The layered depth textures of a scene: the tracer that peels a mesh when rays can meet it for the first time.
+
+Maps are kept by mesh and resolution. A frame uses exactly the resolutions that are chosen for it, whatever is kept, so
+that it has the bits of a first frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from ldtrefl.device.launch import Stats
+from ldtrefl.ldt.exact.record_choice import Quality
+from ldtrefl.ldt.searches import TRACERS
+from ldtrefl.ldt.texture import DEFAULT_RESOLUTION, LayeredDepthTexture, LinearSteps, peel_mesh
+from ldtrefl.tracing.tracer import BoundTracer, array_of_views
+from ldtrefl.world.device_scene import DeviceScene
+from ldtrefl.world.device_mesh import DeviceMesh
+
+RESOLUTIONS_KEPT = 4
+"""Of a mesh, maps of so many resolutions are kept: a camera that comes near and goes back peels nothing twice. The
+price of using exactly what is chosen is to peel a mesh again where finer maps would have done."""
+
+
+@dataclass(frozen=True)
+class MapOptions:
+    """How maps are made and searched."""
+
+    search: str
+    quality: Quality
+    linear_steps: LinearSteps
+    binary_steps: int
+    resolution: int | None
+    """Texels along a mesh's longest side where nothing else is chosen; None for the default."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Bound:
+    """A tracer, and what it was made of."""
+
+    maps: dict[DeviceMesh, LayeredDepthTexture | None]
+    """Of each mesh; None where none are needed."""
+    tracer: BoundTracer
+    views: list[object]
+    """They own what the tracer points to."""
+
+
+class SceneMaps:
+    """A ``SceneTracer`` that searches in layered depth textures."""
+
+    def __init__(self, options: MapOptions) -> None:
+        self.options = options
+        self.chosen: Mapping[DeviceMesh, int] = {}
+        """Resolutions for the rays to come; a mesh that is not in it has the usual one."""
+        self._maps: dict[tuple[DeviceMesh, int, bool], LayeredDepthTexture] = {}
+        """By mesh, resolution and whether they are trusted; those used last at the end."""
+        self._bound: _Bound | None = None
+
+    @property
+    def usual(self) -> int:
+        """The resolution of maps that nothing is chosen for."""
+        return self.options.resolution or DEFAULT_RESOLUTION
+
+    def bound(self, scene: DeviceScene, objects: set[int], stats: Stats) -> BoundTracer:
+        """The tracer, once the maps of these objects are peeled at the resolutions chosen."""
+        maps = self._maps
+        with stats.stage("peel", scene.device):
+            for mesh in dict.fromkeys(scene.objects[index].geometry for index in sorted(objects)):
+                key = self._key(mesh)
+                if key not in maps:
+                    maps[key] = self._peeled(*key, stats)
+                maps[key] = maps.pop(key)  # used last
+            # Whatever was peeled for other frames has no part in this one.
+            current = {mesh: maps.get(self._key(mesh)) for mesh in _meshes(scene)}
+            if self._bound is None or self._bound.maps != current:
+                self._bound = self._bind(scene, current)
+        return self._bound.tracer
+
+    def has_usual_maps(self, scene: DeviceScene, objects: set[int]) -> bool:
+        """Whether the maps of these objects are made, at the usual resolution."""
+        meshes = {scene.objects[index].geometry for index in objects}
+        return all((mesh, self.usual, False) in self._maps for mesh in meshes)
+
+    def meshes_without_maps(self, scene: DeviceScene) -> int:
+        """Meshes that nothing has been peeled of."""
+        return len(_meshes(scene).keys() - {mesh for mesh, _, _ in self._maps})
+
+    def drop_old_maps(self) -> None:
+        """Of each mesh keep the maps at the ``RESOLUTIONS_KEPT`` that were used last."""
+        count: dict[DeviceMesh, int] = {}
+        for key in reversed(list(self._maps)):
+            count[key[0]] = count.get(key[0], 0) + 1
+            if count[key[0]] > RESOLUTIONS_KEPT:
+                del self._maps[key]
+
+    def _key(self, mesh: DeviceMesh) -> tuple[DeviceMesh, int, bool]:
+        """Which maps of a mesh are meant."""
+        resolution = self.chosen.get(mesh, self.usual)
+        # Coarser than usual they are trusted; at the usual resolution the exact search's patches are checked.
+        trusted = resolution < self.usual
+        return mesh, min(resolution, self.usual) if self.options.search == "exact" else resolution, trusted
+
+    def _peeled(self, mesh: DeviceMesh, resolution: int, trusted: bool, stats: Stats) -> LayeredDepthTexture:
+        options = self.options
+        peeled = peel_mesh(mesh, resolution, quality=options.quality, search=options.search, trusted=trusted)
+        stats.count("objects_from_cache" if peeled.from_cache else "objects_peeled", 1)
+        stats.count("records", peeled.record_count)
+        stats.count("map_bytes", peeled.nbytes)
+        return peeled
+
+    def _bind(self, scene: DeviceScene, current: dict[DeviceMesh, LayeredDepthTexture | None]) -> _Bound:
+        options, tracer = self.options, TRACERS[self.options.search]
+        of_mesh = {
+            mesh: tracer.view()
+            if maps is None
+            else maps.view(options.search, linear_steps=options.linear_steps, binary_steps=options.binary_steps)
+            for mesh, maps in current.items()
+        }
+        views = array_of_views([of_mesh[entry.geometry] for entry in scene.objects], tracer.view, scene.device)
+        return _Bound(current, BoundTracer(tracer, views), list(of_mesh.values()))
+
+
+def _meshes(scene: DeviceScene) -> dict[DeviceMesh, None]:
+    """Every mesh once."""
+    return dict.fromkeys(entry.geometry for entry in scene.objects)

@@ -1,0 +1,144 @@
+"""A point of an object's surface as it is shaded: position, normals, colours, and specular reflectance.
+
+Normals face the viewer. All directions are unit vectors in device space.
+"""
+
+from __future__ import annotations
+
+import warp as wp
+
+from ldtrefl.geometry.triangle import ONE_THIRD, plane_coordinates
+from ldtrefl.geometry.vectors import as_double, as_single
+from ldtrefl.shading.specular import schlick
+from ldtrefl.shading.textures import sample_texture
+from ldtrefl.world.records import ObjectRecord
+
+SMALLEST_NORMAL = wp.constant(1.0e-12)
+"""Squared length below which a vertex normal says nothing and the facet's is taken."""
+
+SMALLEST_SINE = wp.constant(1.0e-6)
+"""Squared sine of a triangle's corner below which nothing is extended beyond it."""
+
+FARTHEST_TURN = wp.constant(0.1)
+"""Radians that a normal may turn beyond the triangle that it is known on. A smooth surface bends less over a patch."""
+
+
+@wp.struct
+class Surface:
+    """A point of a surface, ready to be shaded."""
+
+    position: wp.vec3d
+    object: int
+    triangle: int
+    normal: wp.vec3  # shading normal, unit, on the viewer's side of the facet
+    facet: wp.vec3  # facet normal, unit, facing the viewer
+    albedo: wp.vec3  # times the texture
+    emission: wp.vec3
+    mirror: wp.vec3  # specular reflectance in this direction, Fresnel included
+
+
+@wp.func
+def extended_coordinates(record: ObjectRecord, triangle: int, point: wp.vec3d) -> wp.vec2:
+    """Barycentrics of a point about a triangle that stands for its neighbours, too: outside it they go on linearly.
+
+    So shading is smooth over a patch of many triangles, though only one of them is known. Where normals are
+    interpolated they go on until the normal has turned by ``FARTHEST_TURN``: the normals of a noisy mesh say nothing of
+    their neighbours'. ``point`` is in device space.
+    """
+    corners = record.faces[triangle]
+    a, b, c = record.vertices[corners[0]], record.vertices[corners[1]], record.vertices[corners[2]]
+    middle = wp.vec2(ONE_THIRD, ONE_THIRD)
+    at = plane_coordinates(a, b, c, as_single(wp.transform_point(record.unit_from_device, point)))
+    if not at[2] > SMALLEST_SINE:
+        return middle
+    offset = wp.vec2(at[0], at[1]) - middle
+    if record.smooth == 0:
+        return middle + offset  # there may be no normals, and none is interpolated
+    na = record.normals[corners[0]]
+    turn = wp.length(offset[0] * (record.normals[corners[1]] - na) + offset[1] * (record.normals[corners[2]] - na))
+    return middle + wp.min(1.0, FARTHEST_TURN * wp.length(na) / wp.max(turn, SMALLEST_NORMAL)) * offset
+
+
+@wp.func
+def facing_facet(objects: wp.array(dtype=ObjectRecord), index: int, across: wp.vec3, view: wp.vec3) -> wp.vec3:
+    """A facet's normal ``across`` in unit space, of any length, turned to the side that the viewer sees."""
+    if wp.dot(objects[index].normal_from_unit * across, view) > 0.0:
+        return -across
+    return across
+
+
+@wp.func
+def shading_normal(
+    objects: wp.array(dtype=ObjectRecord), index: int, corners: wp.vec3i, u: float, v: float, across: wp.vec3
+) -> wp.vec3:
+    """The unit normal that a point is shaded with: interpolated, on the side of the facet's normal ``across``; or the
+    facet's own where the object is not smooth, or its normals say nothing there."""
+    normal = wp.vec3(0.0)
+    if objects[index].smooth != 0:
+        interpolated = (
+            (1.0 - u - v) * objects[index].normals[corners[0]]
+            + u * objects[index].normals[corners[1]]
+            + v * objects[index].normals[corners[2]]
+        )
+        if wp.dot(interpolated, interpolated) > SMALLEST_NORMAL:
+            normal = objects[index].normal_from_unit * wp.normalize(interpolated)
+            if wp.dot(normal, objects[index].normal_from_unit * across) < 0.0:
+                normal = -normal
+    if normal == wp.vec3(0.0):
+        normal = objects[index].normal_from_unit * wp.normalize(across)
+    return wp.normalize(normal)
+
+
+@wp.func
+def part_of(objects: wp.array(dtype=ObjectRecord), index: int, triangle: int) -> int:
+    """The part of an object's mesh that holds a triangle."""
+    part = int(0)
+    for next in range(1, objects[index].part_first.shape[0]):
+        if objects[index].part_first[next] <= triangle:
+            part = next
+    return part
+
+
+@wp.func
+def albedo_at(
+    objects: wp.array(dtype=ObjectRecord), index: int, triangle: int, corners: wp.vec3i, u: float, v: float
+) -> wp.vec3:
+    """The albedo at barycentrics (u, v) of a triangle: the object's, times that of the mesh's part and its texture."""
+    part = part_of(objects, index, triangle)
+    color = wp.cw_mul(objects[index].albedo, objects[index].part_color[part])
+    place = objects[index].part_texture[part]
+    if place[1] > 0:
+        uv = (
+            (1.0 - u - v) * objects[index].uvs[corners[0]]
+            + u * objects[index].uvs[corners[1]]
+            + v * objects[index].uvs[corners[2]]
+        )
+        color = wp.cw_mul(color, sample_texture(objects, index, place, uv))
+    return color
+
+
+@wp.func
+def surface_at(
+    objects: wp.array(dtype=ObjectRecord), index: int, triangle: int, u: float, v: float, view: wp.vec3
+) -> Surface:
+    """The surface of object ``index`` at barycentrics (u, v) of ``triangle``, seen along unit direction ``view``."""
+    corners = objects[index].faces[triangle]
+    a, b, c = (
+        objects[index].vertices[corners[0]],
+        objects[index].vertices[corners[1]],
+        objects[index].vertices[corners[2]],
+    )
+    surface = Surface()
+    surface.object = index
+    surface.triangle = triangle
+    point = (1.0 - u - v) * a + u * b + v * c
+    surface.position = wp.transform_point(objects[index].device_from_unit, as_double(point))
+    across = facing_facet(objects, index, wp.cross(b - a, c - a), view)
+    surface.facet = wp.normalize(objects[index].normal_from_unit * wp.normalize(across))
+    surface.normal = shading_normal(objects, index, corners, u, v, across)
+    surface.albedo = albedo_at(objects, index, triangle, corners, u, v)
+    surface.emission = objects[index].emission
+    surface.mirror = objects[index].mirror
+    if objects[index].fresnel != 0:
+        surface.mirror = schlick(surface.mirror, -wp.dot(surface.normal, view))
+    return surface

@@ -1,0 +1,147 @@
+"""The closest hits of reflected rays over all objects of a scene, for every tracer.
+
+A ray's own object is left out of the search: reflectors do not yet reflect themselves.
+"""
+
+import warp as wp
+
+from ldtrefl.device import launch
+from ldtrefl.geometry.sphere import meets_sphere, sphere_entry
+from ldtrefl.geometry.vectors import as_single
+from ldtrefl.tracing.hit import Hit
+from ldtrefl.tracing.object_sets import ObjectSets, has_bit, lowest_bit, object_bits, without
+from ldtrefl.tracing.ray_buffers import HitBuffer, RayBuffer, keep_nearer, set_miss
+from ldtrefl.tracing.tracer import Query, Tracer
+from ldtrefl.world.records import ObjectRecord
+from ldtrefl.world.unit_rays import into_unit
+
+BEYOND = wp.constant(1.000001)
+"""Of the distance that was met, how far another object is searched: what lies in the same place must be found too."""
+
+
+@wp.func
+def bits_without_source(
+    sets: ObjectSets, objects: wp.array(dtype=ObjectRecord), source: int, i: int, word: int
+) -> wp.uint32:
+    """The objects of a word that ray ``i`` can meet: not the one that it leaves."""
+    bits = object_bits(sets, objects, i, word)
+    if source / 32 == word:
+        bits = without(bits, source)
+    return bits
+
+
+@wp.func
+def first_entered(
+    objects: wp.array(dtype=ObjectRecord), bits: wp.uint32, word: int, origin: wp.vec3, direction: wp.vec3
+) -> int:
+    """Of the objects of a word of bits, the one whose bounding sphere a ray enters first; if it enters none, any."""
+    first = 32 * word + lowest_bit(bits)
+    rest = without(bits, first)
+    if rest == wp.uint32(0):
+        return first
+    nearest = sphere_entry(origin, direction, objects[first].centre, objects[first].radius)
+    while rest != wp.uint32(0):
+        k = 32 * word + lowest_bit(rest)
+        entry = sphere_entry(origin, direction, objects[k].centre, objects[k].radius)
+        if entry >= 0.0 and (entry < nearest or nearest < 0.0):
+            nearest = entry
+            first = k
+        rest = without(rest, k)
+    return first
+
+
+@wp.func
+def may_meet(record: ObjectRecord, origin: wp.vec3d, direction: wp.vec3, t_max: float) -> bool:
+    """Whether a ray enters the bounding sphere of an object before ``t_max``."""
+    start = as_single(origin)
+    if t_max == wp.inf:
+        return meets_sphere(start, direction, record.centre, record.radius)  # needs no root
+    entry = sphere_entry(start, direction, record.centre, record.radius)
+    return entry >= 0.0 and entry <= t_max
+
+
+@wp.struct
+class Asked:
+    """A ray that is searched for in an object."""
+
+    ray: int  # its number
+    stretch: float  # length in the object's unit space of a device unit along it
+
+
+@launch.once
+def closest_hits_kernel(tracer: Tracer, block: int, bounds: bool = True) -> wp.Kernel:
+    """The kernel that finds where rays end, ``block`` of them an item. With ``bounds`` an object is searched only for
+    the rays that enter its bounding sphere before they have met another; of 32 the first to be entered comes first."""
+    find_hits, size, to_infinity = tracer.closest_hits, wp.constant(block), wp.constant(not bounds)
+
+    @wp.func
+    def is_searched(record: ObjectRecord, rays: RayBuffer, hits: HitBuffer, i: int) -> bool:
+        if to_infinity:
+            return True
+        return may_meet(record, rays.origin[i], rays.direction[i], hits.t[i])
+
+    @wp.func
+    def keep(record: ObjectRecord, rays: RayBuffer, asked: Asked, k: int, found: Hit, hits: HitBuffer):
+        i = asked.ray
+        hits.steps[i] = hits.steps[i] + found.steps
+        hits.searches[i] = hits.searches[i] + 1
+        is_met = found.triangle >= 0
+        if to_infinity and is_met:
+            # Coarse patches may rise out of the sphere, where a search by bounds does not look.
+            is_met = may_meet(record, rays.origin[i], rays.direction[i], wp.inf)
+        if is_met:
+            keep_nearer(hits, i, k, found.t / asked.stretch, found)
+
+    @launch.kernel
+    def closest_hits(
+        first: int,
+        # In:
+        rays: RayBuffer,
+        objects: wp.array(dtype=ObjectRecord),
+        views: wp.array(dtype=tracer.view),
+        sets: ObjectSets,
+        # Out:
+        hits: HitBuffer,
+    ):
+        """Find the closest hits of one block of rays, object by object."""
+        begin = size * (first + wp.tid())
+        end = wp.min(begin + size, rays.source.shape[0])
+        query_room, hit_room = wp.zeros(shape=size, dtype=Query), wp.zeros(shape=size, dtype=Hit)
+        queries = wp.array(ptr=query_room.ptr, shape=(size,), dtype=Query)
+        found = wp.array(ptr=hit_room.ptr, shape=(size,), dtype=Hit)
+        asked = wp.zeros(shape=size, dtype=Asked)
+        lead = int(-1)  # the first ray that is alive: objects are searched in the order in which it enters them
+        for i in range(begin, end):
+            set_miss(hits, i)
+            if lead < 0 and rays.source[i] >= 0:
+                lead = i
+        words = wp.where(lead >= 0, (objects.shape[0] + 31) / 32, 0)
+        for word in range(words):
+            left = wp.uint32(0)
+            for i in range(begin, end):
+                if rays.source[i] >= 0:
+                    left = left | bits_without_source(sets, objects, rays.source[i], i, word)
+            while left != wp.uint32(0):
+                k = first_entered(objects, left, word, as_single(rays.origin[lead]), rays.direction[lead])
+                left = without(left, k)
+
+                # Ask for the rays that may meet it.
+                count = int(0)
+                for i in range(begin, end):
+                    source = rays.source[i]
+                    if source >= 0 and has_bit(bits_without_source(sets, objects, source, i, word), k):
+                        if is_searched(objects[k], rays, hits, i):
+                            ray = into_unit(objects[k], rays.origin[i], rays.direction[i])
+                            queries[count].origin = ray.start
+                            queries[count].direction = ray.way
+                            # t stays in device units: divide by the direction's length in unit space.
+                            queries[count].t_max = wp.where(to_infinity, wp.inf, BEYOND * hits.t[i] * ray.stretch)
+                            asked[count].ray = i
+                            asked[count].stretch = ray.stretch
+                            count += 1
+                if count > 0:
+                    find_hits(views, k, queries, count, found)
+                for j in range(count):
+                    keep(objects[k], rays, asked[j], k, found[j], hits)
+
+    return closest_hits

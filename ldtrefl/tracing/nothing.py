@@ -1,0 +1,37 @@
+"""A tracer that meets nothing, for scenes without shadows: kernels that are built from it hold no shadow rays."""
+
+from __future__ import annotations
+
+import warp as wp
+
+from ldtrefl.tracing.hit import Hit
+from ldtrefl.tracing.tracer import BoundTracer, Query, Tracer
+
+
+@wp.struct
+class NoView:
+    """The view of a tracer that sees nothing."""
+
+    unused: int
+
+
+@wp.func
+def never_hits(
+    views: wp.array(dtype=NoView), index: int, queries: wp.array(dtype=Query), count: int, hits: wp.array(dtype=Hit)
+):
+    """``closest_hits`` and ``any_hits`` of a tracer that sees nothing: they stay misses."""
+    return
+
+
+@wp.func
+def never_occluded(views: wp.array(dtype=NoView), index: int, query: Query, outwards: wp.vec3) -> bool:
+    """``occluded`` of a tracer that sees nothing."""
+    return False
+
+
+NOTHING = Tracer("nothing", NoView, never_hits, never_hits, never_occluded)
+
+
+def no_shadows(device: wp.Device) -> BoundTracer:
+    """``NOTHING``, bound."""
+    return BoundTracer(NOTHING, wp.empty(0, dtype=NoView, device=device))

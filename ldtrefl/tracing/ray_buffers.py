@@ -1,0 +1,137 @@
+"""Rays on their way, and where they end, as arrays of all rays of a frame.
+
+Device space; directions have unit length. Several rays may belong to one pixel: they then stand in a row, so that what
+they bring can be summed in a fixed order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TypeVar
+
+import numpy as np
+import warp as wp
+
+from ldtrefl.tracing.hit import Hit
+
+Buffer = TypeVar("Buffer")
+
+
+@wp.struct
+class RayBuffer:
+    """Rays on their way; a ray is dead where its source is -1."""
+
+    pixel: wp.array(dtype=wp.int32)  # to which it contributes
+    origin: wp.array(dtype=wp.vec3d)
+    direction: wp.array(dtype=wp.vec3)
+    throughput: wp.array(dtype=wp.vec3)  # what a unit of radiance met now adds to what the ray brings
+    source: wp.array(dtype=wp.int32)  # the object that it leaves
+    source_triangle: wp.array(dtype=wp.int32)  # and the triangle of that object
+
+
+@wp.struct
+class HitBuffer:
+    """Where the rays of a ``RayBuffer`` end."""
+
+    t: wp.array(dtype=float)  # device units, +inf on a miss
+    object: wp.array(dtype=wp.int32)  # -1 on a miss
+    triangle: wp.array(dtype=wp.int32)  # -1 on a miss
+    barycentrics: wp.array(dtype=wp.vec2)  # weights of the second and third corner; below 0 if one stands for many
+    steps: wp.array(dtype=wp.int32)  # texels, samples or nodes looked at
+    searches: wp.array(dtype=wp.int32)  # objects that the ray was searched for in
+
+
+@wp.func
+def set_miss(hits: HitBuffer, i: int):
+    """Let ray ``i`` have met nothing so far."""
+    hits.t[i] = wp.inf
+    hits.object[i] = -1
+    hits.triangle[i] = -1
+    hits.barycentrics[i] = wp.vec2(0.0)
+    hits.steps[i] = 0
+    hits.searches[i] = 0
+
+
+@wp.func
+def keep_nearer(hits: HitBuffer, i: int, k: int, t: float, hit: Hit):
+    """Keep what ray ``i`` meets of object ``k``, if it is nearer than what it has met so far."""
+    # Of two in one place the first counts, in whatever order they are met.
+    if t < hits.t[i] or (t == hits.t[i] and k < hits.object[i]):
+        hits.t[i] = t
+        hits.object[i] = k
+        hits.triangle[i] = hit.triangle
+        hits.barycentrics[i] = wp.vec2(hit.u, hit.v)
+
+
+@wp.func
+def copy_hit(hits: HitBuffer, i: int, hits_out: HitBuffer, k: int):
+    """Write where ray ``i`` of a buffer ends as the end of ray ``k`` of another."""
+    hits_out.t[k] = hits.t[i]
+    hits_out.object[k] = hits.object[i]
+    hits_out.triangle[k] = hits.triangle[i]
+    hits_out.barycentrics[k] = hits.barycentrics[i]
+    hits_out.steps[k] = hits.steps[i]
+    hits_out.searches[k] = hits.searches[i]
+
+
+@wp.func
+def copy_ray(rays: RayBuffer, i: int, rays_out: RayBuffer, k: int):
+    """Write ray ``i`` of a buffer as ray ``k`` of another."""
+    rays_out.pixel[k] = rays.pixel[i]
+    rays_out.origin[k] = rays.origin[i]
+    rays_out.direction[k] = rays.direction[i]
+    rays_out.throughput[k] = rays.throughput[i]
+    rays_out.source[k] = rays.source[i]
+    rays_out.source_triangle[k] = rays.source_triangle[i]
+
+
+def empty_rays(count: int, device: wp.Device) -> RayBuffer:
+    """Room for so many rays."""
+    rays = RayBuffer()
+    rays.pixel, rays.source, rays.source_triangle = (wp.empty(count, dtype=wp.int32, device=device) for _ in range(3))
+    rays.origin = wp.empty(count, dtype=wp.vec3d, device=device)
+    rays.direction, rays.throughput = (wp.empty(count, dtype=wp.vec3, device=device) for _ in range(2))
+    return rays
+
+
+def empty_hits(count: int, device: wp.Device) -> HitBuffer:
+    """Room for the ends of so many rays."""
+    hits = HitBuffer()
+    hits.t = wp.empty(count, dtype=float, device=device)
+    hits.object, hits.triangle, hits.steps, hits.searches = (
+        wp.empty(count, dtype=wp.int32, device=device) for _ in range(4)
+    )
+    hits.barycentrics = wp.empty(count, dtype=wp.vec2, device=device)
+    return hits
+
+
+def cloned(kind: type[Buffer], buffer: Buffer) -> Buffer:
+    """A copy of a buffer; ``kind`` is its type."""
+    made = kind()
+    for name in _arrays_of(kind):
+        setattr(made, name, wp.clone(getattr(buffer, name)))
+    return made
+
+
+def joined(kind: type[Buffer], buffers: Sequence[Buffer]) -> Buffer:
+    """The rays of several buffers, one after another in one; ``kind`` is their type."""
+    made = kind()
+    for name in _arrays_of(kind):
+        arrays = [getattr(buffer, name) for buffer in buffers]
+        values = np.concatenate([array.numpy() for array in arrays])
+        setattr(made, name, wp.array(values, dtype=arrays[0].dtype, device=arrays[0].device))
+    return made
+
+
+def _arrays_of(kind: type) -> list[str]:
+    """Names of the arrays of a Warp struct."""
+    return list(kind.vars)  # type: ignore[attr-defined]
+
+
+def distance_across(
+    origin: np.ndarray, direction: np.ndarray, other_origin: np.ndarray, other_direction: np.ndarray, t: np.ndarray
+) -> np.ndarray:
+    """(n,) how far apart pairs of rays are at ``t``, (n,), across the first's direction; vectors are (n, 3)."""
+    gap = other_origin - origin + t[:, None] * (other_direction - direction)
+    gap -= (gap * direction).sum(axis=1, keepdims=True) * direction
+    return np.linalg.norm(gap, axis=1)

@@ -1,0 +1,28 @@
+"""The BVHs of a scene, one a mesh: the tracer of ray casting, and of the shadows of every method without its own."""
+
+from __future__ import annotations
+
+from ldtrefl.device.launch import Stats
+from ldtrefl.tracing.bvh import BVH, BvhView, Raycaster
+from ldtrefl.tracing.tracer import BoundTracer, array_of_views
+from ldtrefl.world.device_scene import DeviceScene
+from ldtrefl.world.device_mesh import DeviceMesh
+
+
+class SceneBvh:
+    """A ``SceneTracer`` that builds the BVHs of all meshes when the first is needed."""
+
+    def __init__(self) -> None:
+        self._bound: BoundTracer | None = None
+        self._owners: dict[DeviceMesh, Raycaster] = {}
+        """What the views point to."""
+
+    def bound(self, scene: DeviceScene, objects: set[int], stats: Stats) -> BoundTracer:
+        """The tracer over all objects, of this scene and of all that come from it by moves."""
+        if self._bound is None:
+            with stats.stage("build", scene.device):
+                meshes = dict.fromkeys(entry.geometry for entry in scene.objects)
+                self._owners = {mesh: Raycaster.of(mesh) for mesh in meshes}
+                views = [self._owners[entry.geometry].view() for entry in scene.objects]
+                self._bound = BoundTracer(BVH, array_of_views(views, BvhView, scene.device))
+        return self._bound
