@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
-from numpy.typing import ArrayLike
 
 import ldtrefl
 from ldtrefl.scene import shapes
@@ -101,7 +102,7 @@ def made() -> dict[str, ldtrefl.Mesh]:
 def refused() -> list[Outcome]:
     """What is no mesh is refused in one line that names the first fault."""
     good = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
-    wrong: dict[str, tuple[ArrayLike, ArrayLike, str]] = {
+    wrong: dict[str, tuple[Any, Any, str]] = {
         "index too large": (good, [[0, 1, 2], [0, 1, 3]], "triangle 1"),
         "negative index": (good, [[0, -1, 2]], "triangle 0"),
         "NaN vertex": ([*good, [0, np.nan, 0]], [[0, 1, 2]], "vertex 3"),
