@@ -16,7 +16,7 @@ import warp as wp
 from ldtrefl.base import budget
 from ldtrefl.base.errors import InputError
 from ldtrefl.device import launch
-from ldtrefl.device.launch import Stats
+from ldtrefl.device.stats import Stats
 from ldtrefl.frame.camera_shading import shade_gbuffer
 from ldtrefl.frame.composite import composed
 from ldtrefl.frame.gbuffer import GBuffer

@@ -16,6 +16,7 @@ import numpy as np
 import warp as wp
 
 from ldtrefl.device import launch
+from ldtrefl.device.stats import Stats
 from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.regions import Regions
 from ldtrefl.frame.shadows import direct_radiance_of
@@ -125,10 +126,10 @@ def summed_by_pixel(pixels: wp.array, rays: RayBuffer, radiance: wp.array) -> wp
 class Guide(Protocol):
     """What a method decides for the rays of a bounce."""
 
-    def regions(self, gbuffer: GBuffer, rays: RayBuffer, bounce: int, stats: launch.Stats) -> Regions:
+    def regions(self, gbuffer: GBuffer, rays: RayBuffer, bounce: int, stats: Stats) -> Regions:
         """Which objects the rays of a bounce can meet; bounce 0 is the first."""
 
-    def traced(self, objects: set[int], stats: launch.Stats) -> BoundTracer:
+    def traced(self, objects: set[int], stats: Stats) -> BoundTracer:
         """The tracer for rays that can meet these objects."""
 
 
@@ -154,7 +155,7 @@ class RayFollower:
     guide: Guide
     max_bounces: int
     skips: Skips
-    stats: launch.Stats
+    stats: Stats
 
     def first_regions(self, rays: RayBuffer) -> Regions:
         """Which objects the first rays can meet."""

@@ -13,6 +13,7 @@ from __future__ import annotations
 import warp as wp
 
 from ldtrefl.device import launch
+from ldtrefl.device.stats import Stats
 from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.regions import Regions
 from ldtrefl.geometry.vectors import as_double, as_single
@@ -125,7 +126,7 @@ def find_rows(
     rows_out[i] = first_rows[rays.source[i]] + pixel_triangle[rays.pixel[i]]
 
 
-def flat_regions(gbuffer: GBuffer, rays: RayBuffer, stats: launch.Stats) -> Regions:
+def flat_regions(gbuffer: GBuffer, rays: RayBuffer, stats: Stats) -> Regions:
     """Test the triangles of all reflectors for the rays of the first bounce; counts as ``safe_regions`` does."""
     scene, device, count = gbuffer.scene, gbuffer.scene.device, len(gbuffer.scene.objects)
     first_rows, total = scene.reflector_rows

@@ -17,6 +17,7 @@ import numpy as np
 import warp as wp
 
 from ldtrefl.device import launch
+from ldtrefl.device.stats import Stats
 from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.geometry.sphere import meets_sphere
 from ldtrefl.geometry.vectors import as_single
@@ -139,7 +140,7 @@ def all_objects(scene: DeviceScene) -> Regions:
     return Regions(sets, shown)
 
 
-def safe_regions(gbuffer: GBuffer, rays: RayBuffer, bounce: int, stats: launch.Stats) -> Regions:
+def safe_regions(gbuffer: GBuffer, rays: RayBuffer, bounce: int, stats: Stats) -> Regions:
     """Test the rays of a bounce, 0 the first.
 
     Counts ``triangles_tested``, those of all reflectors, and ``triangles_culled``, those that are not seen or that none

@@ -12,7 +12,7 @@ import numpy as np
 import warp as wp
 
 from ldtrefl.base import budget
-from ldtrefl.device.launch import Stats
+from ldtrefl.device.stats import Stats
 from ldtrefl.frame.composite import reflection_picture
 from ldtrefl.frame.first_hits import FirstHits
 from ldtrefl.frame.gbuffer import GBuffer

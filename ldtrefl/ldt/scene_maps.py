@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from ldtrefl.device.launch import Stats
+from ldtrefl.device.stats import Stats
 from ldtrefl.ldt.exact.record_choice import Quality
 from ldtrefl.ldt.searches import TRACERS
 from ldtrefl.ldt.texture import DEFAULT_RESOLUTION, LayeredDepthTexture, LinearSteps, peel_mesh

@@ -15,7 +15,7 @@ from typing import Annotated
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from ldtrefl.device.launch import Stats
+from ldtrefl.device.stats import Stats
 from ldtrefl.frame.bounces import RayFollower, summed_by_pixel
 from ldtrefl.frame.first_hits import FirstHits
 from ldtrefl.frame.gbuffer import GBuffer

@@ -20,7 +20,7 @@ from pydantic.dataclasses import dataclass
 
 from ldtrefl.base import budget
 from ldtrefl.device import launch
-from ldtrefl.device.launch import Stats
+from ldtrefl.device.stats import Stats
 from ldtrefl.frame.camera_shading import shade_gbuffer
 from ldtrefl.frame.gbuffer import GBuffer, GBufferView, pixel_surface, pixel_view
 from ldtrefl.frame.visibility import draw_in_bands

@@ -21,7 +21,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from ldtrefl.device.launch import Stats
+from ldtrefl.device.stats import Stats
 from ldtrefl.frame.bounces import FollowedRays, RayFollower, summed_by_pixel
 from ldtrefl.frame.camera_shading import shade_gbuffer
 from ldtrefl.frame.first_hits import FirstHits

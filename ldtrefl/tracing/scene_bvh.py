@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ldtrefl.device.launch import Stats
+from ldtrefl.device.stats import Stats
 from ldtrefl.tracing.bvh import BVH, BvhView, Raycaster
 from ldtrefl.tracing.tracer import BoundTracer, array_of_views
 from ldtrefl.world.device_scene import DeviceScene

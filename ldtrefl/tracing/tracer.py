@@ -13,7 +13,7 @@ from typing import Any, Protocol
 import warp as wp
 
 from ldtrefl.device import warp_abi
-from ldtrefl.device.launch import Stats
+from ldtrefl.device.stats import Stats
 from ldtrefl.world.device_scene import DeviceScene
 
 RAY_BLOCK = wp.constant(64)
