@@ -30,8 +30,7 @@ from ldtrefl.tracing.nothing import no_shadows
 from ldtrefl.tracing.object_sets import ObjectSets
 from ldtrefl.tracing.ray_buffers import HitBuffer, RayBuffer, cloned, empty_hits
 from ldtrefl.tracing.tracer import BoundTracer, Tracer, block_of
-from ldtrefl.world.records import LightingRecord
-from ldtrefl.world.records import ObjectRecord
+from ldtrefl.world.records import LightingRecord, ObjectRecord
 
 
 @launch.once

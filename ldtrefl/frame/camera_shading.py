@@ -13,8 +13,7 @@ from ldtrefl.shading.surface import Surface
 from ldtrefl.tracing.ray_buffers import RayBuffer, empty_rays
 from ldtrefl.tracing.tracer import BoundTracer, Tracer
 from ldtrefl.world.camera import camera_ray
-from ldtrefl.world.records import LightingRecord
-from ldtrefl.world.records import ObjectRecord
+from ldtrefl.world.records import LightingRecord, ObjectRecord
 
 
 @launch.once

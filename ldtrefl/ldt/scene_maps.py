@@ -14,8 +14,8 @@ from ldtrefl.ldt.exact.record_choice import Quality
 from ldtrefl.ldt.searches import TRACERS
 from ldtrefl.ldt.texture import DEFAULT_RESOLUTION, LayeredDepthTexture, LinearSteps, peel_mesh
 from ldtrefl.tracing.tracer import BoundTracer, array_of_views
-from ldtrefl.world.device_scene import DeviceScene
 from ldtrefl.world.device_mesh import DeviceMesh
+from ldtrefl.world.device_scene import DeviceScene
 
 RESOLUTIONS_KEPT = 4
 """Of a mesh, maps of so many resolutions are kept: a camera that comes near and goes back peels nothing twice. The

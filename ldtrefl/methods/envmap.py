@@ -30,8 +30,8 @@ from ldtrefl.scene.description import Camera
 from ldtrefl.shading.specular import mirror_direction
 from ldtrefl.tracing.nothing import no_shadows
 from ldtrefl.tracing.tracer import SceneTracer
-from ldtrefl.world.device_scene import DeviceScene
 from ldtrefl.world.device_object import DeviceObject
+from ldtrefl.world.device_scene import DeviceScene
 from ldtrefl.world.records import ObjectRecord
 
 PIXEL_BYTES = 12

@@ -13,8 +13,7 @@ import warp as wp
 
 from ldtrefl.geometry.vectors import from_to
 from ldtrefl.shading.surface import Surface
-from ldtrefl.world.records import LightingRecord
-from ldtrefl.world.records import ObjectRecord
+from ldtrefl.world.records import LightingRecord, ObjectRecord
 
 SMALLEST_SQUARE = wp.constant(1.0e-36)
 """Squared distance of a light that float32 can divide by: a light in the surface itself divides by no 0."""

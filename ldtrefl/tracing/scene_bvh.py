@@ -5,8 +5,8 @@ from __future__ import annotations
 from ldtrefl.device.stats import Stats
 from ldtrefl.tracing.bvh import BVH, BvhView, Raycaster
 from ldtrefl.tracing.tracer import BoundTracer, array_of_views
-from ldtrefl.world.device_scene import DeviceScene
 from ldtrefl.world.device_mesh import DeviceMesh
+from ldtrefl.world.device_scene import DeviceScene
 
 
 class SceneBvh:
