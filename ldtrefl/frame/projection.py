@@ -39,6 +39,7 @@ def project_vertices(
     # Out: (x, y, 1 / depth) in pixels in front of the camera; elsewhere (x depth, y depth, depth)
     corners_out: wp.array(dtype=wp.vec3d),
 ):
+    """Project the vertices of one chunk."""
     chunk = first + wp.tid()
     index = chunks.object[chunk]
     vertices = objects[index].vertices

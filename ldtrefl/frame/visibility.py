@@ -41,6 +41,7 @@ def resolve_pixels(
     # Out, 0 before:
     reflector_out: wp.array(dtype=wp.uint8),
 ):
+    """Find which point of which triangle one pixel sees, from its key."""
     i = first + wp.tid()
     if keys[i] == wp.int64(0):
         object_out[i] = -1

@@ -129,6 +129,7 @@ def batch_kernel(tracer: Tracer, block: int, only_whether: bool = False) -> wp.K
         barycentrics_out: wp.array(dtype=wp.vec2),
         invalid_out: wp.array(dtype=int),  # rays of the block that are not finite or have no direction
     ):
+        """Trace one block of rays."""
         item = first + wp.tid()
         begin = size * item
         count = wp.min(size, origins.shape[0] - begin)

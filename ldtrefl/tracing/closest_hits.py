@@ -68,29 +68,28 @@ class Asked:
     stretch: float  # length in the object's unit space of a device unit along it
 
 
+@wp.func
+def keep_found(
+    record: ObjectRecord, rays: RayBuffer, asked: Asked, k: int, found: Hit, in_sphere_only: bool, hits: HitBuffer
+):
+    """Count a search in object ``k``, and keep what it found if that is nearer than what the ray has met so far. With
+    ``in_sphere_only`` a hit counts only if the ray meets the bounding sphere."""
+    i = asked.ray
+    hits.steps[i] = hits.steps[i] + found.steps
+    hits.searches[i] = hits.searches[i] + 1
+    is_met = found.triangle >= 0
+    if in_sphere_only and is_met:
+        # Coarse patches may rise out of the sphere, where a search by bounds does not look.
+        is_met = may_meet(record, rays.origin[i], rays.direction[i], wp.inf)
+    if is_met:
+        keep_nearer(hits, i, k, found.t / asked.stretch, found)
+
+
 @launch.once
 def closest_hits_kernel(tracer: Tracer, block: int, bounds: bool = True) -> wp.Kernel:
     """The kernel that finds where rays end, ``block`` of them an item. With ``bounds`` an object is searched only for
     the rays that enter its bounding sphere before they have met another; of 32 the first to be entered comes first."""
     find_hits, size, to_infinity = tracer.closest_hits, wp.constant(block), wp.constant(not bounds)
-
-    @wp.func
-    def is_searched(record: ObjectRecord, rays: RayBuffer, hits: HitBuffer, i: int) -> bool:
-        if to_infinity:
-            return True
-        return may_meet(record, rays.origin[i], rays.direction[i], hits.t[i])
-
-    @wp.func
-    def keep(record: ObjectRecord, rays: RayBuffer, asked: Asked, k: int, found: Hit, hits: HitBuffer):
-        i = asked.ray
-        hits.steps[i] = hits.steps[i] + found.steps
-        hits.searches[i] = hits.searches[i] + 1
-        is_met = found.triangle >= 0
-        if to_infinity and is_met:
-            # Coarse patches may rise out of the sphere, where a search by bounds does not look.
-            is_met = may_meet(record, rays.origin[i], rays.direction[i], wp.inf)
-        if is_met:
-            keep_nearer(hits, i, k, found.t / asked.stretch, found)
 
     @launch.kernel
     def closest_hits(
@@ -130,7 +129,7 @@ def closest_hits_kernel(tracer: Tracer, block: int, bounds: bool = True) -> wp.K
                 for i in range(begin, end):
                     source = rays.source[i]
                     if source >= 0 and has_bit(bits_without_source(sets, objects, source, i, word), k):
-                        if is_searched(objects[k], rays, hits, i):
+                        if to_infinity or may_meet(objects[k], rays.origin[i], rays.direction[i], hits.t[i]):
                             ray = into_unit(objects[k], rays.origin[i], rays.direction[i])
                             queries[count].origin = ray.start
                             queries[count].direction = ray.way
@@ -142,6 +141,6 @@ def closest_hits_kernel(tracer: Tracer, block: int, bounds: bool = True) -> wp.K
                 if count > 0:
                     find_hits(views, k, queries, count, found)
                 for j in range(count):
-                    keep(objects[k], rays, asked[j], k, found[j], hits)
+                    keep_found(objects[k], rays, asked[j], k, found[j], to_infinity, hits)
 
     return closest_hits

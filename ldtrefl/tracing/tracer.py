@@ -8,7 +8,7 @@ depth texture and for the BVH. A miss is ``t = +inf`` and triangle -1.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 import warp as wp
 
@@ -63,7 +63,7 @@ class SceneTracer(Protocol):
         """The tracer, ready for rays that can meet these objects, given by their numbers."""
 
 
-def array_of_views(views: Sequence[Any], view: type, device: wp.Device) -> wp.array:
+def array_of_views(views: Sequence[object], view: type, device: wp.Device) -> wp.array:
     """Views of objects as an array that kernels read. Whoever keeps the array keeps the views, too."""
     return warp_abi.array_of_structs(views, view, device)
 

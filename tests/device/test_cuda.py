@@ -5,19 +5,16 @@ from pathlib import Path
 
 import pytest
 import warp as wp
-from ldtrefl.frame.reflect import (
-    NOTHING,
-    closest_hits_kernel,
-    shade_hits_kernel,
-    shade_pixels_kernel,
-    shade_reflectors_kernel,
-)
-from ldtrefl.tracing.trace import batch_kernel
 
 from ldtrefl.device import launch
+from ldtrefl.frame.bounces import shade_hits_kernel
+from ldtrefl.frame.camera_shading import shade_pixels_kernel, shade_reflectors_kernel
 from ldtrefl.ldt.searches import TRACERS
 from ldtrefl.renderer import Renderer  # noqa: F401  (imports every module that defines kernels)
+from ldtrefl.tracing.batch import batch_kernel
 from ldtrefl.tracing.bvh import BVH
+from ldtrefl.tracing.closest_hits import closest_hits_kernel
+from ldtrefl.tracing.nothing import NOTHING
 
 
 def all_kernels() -> list[wp.Kernel]:
@@ -28,7 +25,8 @@ def all_kernels() -> list[wp.Kernel]:
     for tracer in (NOTHING, BVH, *TRACERS.values()):
         shade_hits_kernel(tracer)
         shade_pixels_kernel(tracer)
-        shade_reflectors_kernel(tracer)
+        shade_reflectors_kernel(tracer, True)
+        shade_reflectors_kernel(tracer, False)
     return [kernel for kernel in launch.KERNELS if kernel.func.__module__.startswith("ldtrefl.")]
 
 

@@ -6,7 +6,8 @@ from stress_cases.inputs import camera_rays
 
 import ldtrefl
 from ldtrefl.device import launch
-from ldtrefl.frame.gbuffer import GBuffer, draw_gbuffer
+from ldtrefl.frame.gbuffer import GBuffer
+from ldtrefl.frame.visibility import draw_gbuffer
 from ldtrefl.scene import shapes
 from ldtrefl.scene.description import Camera, Object, Scene
 from ldtrefl.world.device_scene import DeviceScene

@@ -3,12 +3,14 @@
 import numpy as np
 import pytest
 import warp as wp
-from ldtrefl.tracing.rays import RUN, RayBuffer
 
 import ldtrefl
 from ldtrefl.device import launch
-from ldtrefl.frame.regions import cull_runs, shows_flat
+from ldtrefl.frame.flat_regions import shows_flat
+from ldtrefl.frame.regions import cull_runs
 from ldtrefl.scene.description import Camera, Material, Object, Scene
+from ldtrefl.tracing.object_sets import RUN
+from ldtrefl.tracing.ray_buffers import RayBuffer
 from ldtrefl.world.records import ObjectRecord
 from tests.conftest import SCENES
 
