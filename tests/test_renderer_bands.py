@@ -11,7 +11,7 @@ import ldtrefl
 from ldtrefl import renderer as renderer_module
 from ldtrefl.base import budget
 from ldtrefl.compare.metrics import reprojection_errors
-from ldtrefl.frame import gbuffer
+from ldtrefl.frame import visibility
 from ldtrefl.scene.description import Camera, Lighting
 from tests.frame_scenes import assert_as_fresh, scene
 
@@ -38,7 +38,7 @@ def test_a_large_image_in_bands_has_the_same_bits(
     truth = whole.render()
     assert whole.gbuffer is not None
     monkeypatch.setattr(renderer_module, "LARGEST_WHOLE", 5000)
-    monkeypatch.setattr(gbuffer, "BAND_PIXELS", 2000)
+    monkeypatch.setattr(visibility, "BAND_PIXELS", 2000)
     renderer = ldtrefl.Renderer(lit, method, **options)
     frame = renderer.render()
     assert difference(frame, truth) == "" and renderer.gbuffer is not None
@@ -58,10 +58,11 @@ def test_a_large_image_keeps_nothing_for_the_next(monkeypatch: pytest.MonkeyPatc
     renderer = ldtrefl.Renderer(scene(), "ldt")
     renderer.render()
     monkeypatch.setattr(renderer_module, "LARGEST_WHOLE", 5000)
-    monkeypatch.setattr(gbuffer, "BAND_PIXELS", 2000)
+    monkeypatch.setattr(visibility, "BAND_PIXELS", 2000)
     renderer.render()
     assert "frames_kept" not in renderer.render().stats.counters
-    assert vars(renderer._method)["_last"] is None and renderer._last is None
+    kept = vars(renderer._history)
+    assert kept["_view"] is not None and kept["_parts"] is kept["_reflected"] is kept["_still"] is None
 
 
 def test_an_image_that_is_too_large_is_refused_in_a_line() -> None:
