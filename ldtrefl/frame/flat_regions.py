@@ -16,7 +16,7 @@ from ldtrefl.device import launch
 from ldtrefl.device.stats import Stats
 from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.regions import Regions
-from ldtrefl.geometry.vectors import as_double, as_single
+from ldtrefl.geometry.vectors import as_double, from_to
 from ldtrefl.tracing.object_sets import ObjectSets, objects_in, word_count
 from ldtrefl.tracing.ray_buffers import RayBuffer
 from ldtrefl.world.records import ObjectRecord
@@ -102,11 +102,13 @@ def cull_triangles(
     triangle = first + wp.tid()
     corners = objects[reflector].faces[triangle]
     device_from_unit = objects[reflector].device_from_unit
-    a = as_single(wp.transform_point(device_from_unit, as_double(objects[reflector].vertices[corners[0]])))
-    b = as_single(wp.transform_point(device_from_unit, as_double(objects[reflector].vertices[corners[1]])))
-    c = as_single(wp.transform_point(device_from_unit, as_double(objects[reflector].vertices[corners[2]])))
+    # Seen from the eye, so that float32 holds wherever that is.
+    a = from_to(eye, wp.transform_point(device_from_unit, as_double(objects[reflector].vertices[corners[0]])))
+    b = from_to(eye, wp.transform_point(device_from_unit, as_double(objects[reflector].vertices[corners[1]])))
+    c = from_to(eye, wp.transform_point(device_from_unit, as_double(objects[reflector].vertices[corners[2]])))
     for k in range(objects.shape[0]):
-        if k != reflector and shows_flat(as_single(eye), a, b, c, objects[k].centre, objects[k].radius):
+        centre = from_to(eye, objects[k].centre)
+        if k != reflector and shows_flat(wp.vec3(0.0), a, b, c, centre, objects[k].radius):
             word = bits_out[first_row + triangle, k / 32]
             bits_out[first_row + triangle, k / 32] = word | (wp.uint32(1) << wp.uint32(k % 32))
 

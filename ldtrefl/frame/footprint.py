@@ -43,7 +43,7 @@ def footprint(rays: RayBuffer, width: int, runs: np.ndarray, entry: DeviceObject
     # Which rays are looked at must not depend on the runs that others are left out in.
     numbers = numbers[numbers % max(1, len(pixel) // CANDIDATES) == 0]
     numbers = numbers[(source[numbers] >= 0) & (source[numbers] != entry.index)]
-    offset = np.array(entry.record.centre, np.float32) - origin[numbers]
+    offset = np.array(entry.record.centre, float) - origin[numbers]
     along = (offset * direction[numbers]).sum(axis=1)
     meets = (along > 0.0) & ((offset**2).sum(axis=1) - along**2 <= (SURELY * float(entry.record.radius)) ** 2)
     numbers = numbers[meets]

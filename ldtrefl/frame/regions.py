@@ -20,7 +20,7 @@ from ldtrefl.device import launch
 from ldtrefl.device.stats import Stats
 from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.geometry.sphere import meets_sphere
-from ldtrefl.geometry.vectors import as_single
+from ldtrefl.geometry.vectors import from_to
 from ldtrefl.tracing.object_sets import RUN, ObjectSets, objects_in, run_count, sets_of_runs, word_count
 from ldtrefl.tracing.ray_buffers import RayBuffer
 from ldtrefl.world.device_scene import DeviceScene
@@ -34,7 +34,7 @@ COSINE_SLACK = wp.constant(1.0e-5)
 class RunBounds:
     """A ball about the origins of some rays, and a cone about their directions."""
 
-    middle: wp.vec3
+    middle: wp.vec3d
     reach: float
     axis: wp.vec3
     cosine: float  # of the cone's half-angle; -1 if nothing is known
@@ -43,31 +43,31 @@ class RunBounds:
 @wp.func
 def bounds_of_run(rays: RayBuffer, begin: int, end: int) -> RunBounds:
     """The bounds of the rays from ``begin`` to ``end`` that are alive."""
-    middle = wp.vec3(0.0)
+    middle = wp.vec3d(wp.float64(0.0))
     axis = wp.vec3(0.0)
     alive = int(0)
     for i in range(begin, end):
         if rays.source[i] >= 0:
-            middle += as_single(rays.origin[i])
+            middle += rays.origin[i]
             axis += rays.direction[i]
             alive += 1
     bounds = RunBounds()
-    bounds.middle = middle / float(wp.max(alive, 1))
+    bounds.middle = middle / wp.float64(wp.max(alive, 1))
     bounds.axis = wp.normalize(axis)
     bounds.cosine = 1.0
     for i in range(begin, end):
         if rays.source[i] >= 0:
-            bounds.reach = wp.max(bounds.reach, wp.length(as_single(rays.origin[i]) - bounds.middle))
+            bounds.reach = wp.max(bounds.reach, wp.length(from_to(bounds.middle, rays.origin[i])))
             bounds.cosine = wp.min(bounds.cosine, wp.dot(rays.direction[i], bounds.axis))
     bounds.cosine = wp.max(bounds.cosine - COSINE_SLACK, -1.0)
     return bounds
 
 
 @wp.func
-def may_meet(bounds: RunBounds, centre: wp.vec3, radius: float) -> bool:
+def may_meet(bounds: RunBounds, centre: wp.vec3d, radius: float) -> bool:
     """Whether a ray from the ball along a direction of the cone may meet a sphere; False only if none can."""
     # To move all rays to the ball's middle widens the sphere.
-    towards = centre - bounds.middle
+    towards = from_to(bounds.middle, centre)
     apart = wp.length(towards)
     widened = radius + bounds.reach
     if apart <= widened or bounds.cosine <= 0.0:
@@ -108,7 +108,7 @@ def cull_runs(
                     if (
                         rays.source[i] >= 0
                         and rays.source[i] != k
-                        and meets_sphere(as_single(rays.origin[i]), rays.direction[i], centre, radius)
+                        and meets_sphere(rays.origin[i], rays.direction[i], centre, radius)
                     ):
                         bits = bits | (wp.uint32(1) << wp.uint32(k % 32))
                         i = end

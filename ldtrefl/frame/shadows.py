@@ -7,7 +7,6 @@ import warp as wp
 
 from ldtrefl.device import launch
 from ldtrefl.geometry.sphere import sphere_entry
-from ldtrefl.geometry.vectors import as_single
 from ldtrefl.shading.direct_light import make_direct_radiance
 from ldtrefl.shading.surface import Surface
 from ldtrefl.tracing.nothing import NOTHING
@@ -30,9 +29,8 @@ def direct_radiance_of(tracer: Tracer) -> Callable[..., wp.vec3]:
         distance: float,
     ) -> bool:
         own = surface.object
-        rounded_origin = as_single(surface.position)
         for k in range(objects.shape[0]):
-            entry = sphere_entry(rounded_origin, towards, objects[k].centre, objects[k].radius)
+            entry = sphere_entry(surface.position, towards, objects[k].centre, objects[k].radius)
             if entry >= 0.0 and entry < distance:
                 ray = into_unit(objects[k], surface.position, towards)
                 outwards = unit_normal(objects[k], surface.facet)

@@ -1,29 +1,37 @@
-"""A ray against a sphere. Directions have unit length."""
+"""A ray against a sphere, in float64: a small sphere far away is met as surely as a near one.
+
+A direction is a float32 vector of about unit length; what its rounding adds to that length is taken out.
+"""
 
 from __future__ import annotations
 
 import warp as wp
 
+from ldtrefl.geometry.vectors import as_double
+
 
 @wp.func
-def meets_sphere(origin: wp.vec3, direction: wp.vec3, centre: wp.vec3, radius: float) -> bool:
+def meets_sphere(origin: wp.vec3d, direction: wp.vec3, centre: wp.vec3d, radius: float) -> bool:
     """Whether a ray meets a sphere, or begins inside it: the same answer as ``sphere_entry``'s without its root."""
-    offset = centre - origin
-    along = wp.dot(offset, direction)
-    aside = offset - along * direction
-    return wp.dot(aside, aside) <= radius * radius and (along >= 0.0 or wp.dot(offset, offset) <= radius * radius)
+    offset, way = centre - origin, as_double(direction)
+    square = wp.float64(radius) * wp.float64(radius)
+    # |offset x way| is the distance of the centre from the ray, in lengths of the direction.
+    aside = wp.cross(offset, way)
+    if wp.dot(aside, aside) > square * wp.dot(way, way):
+        return False
+    return wp.dot(offset, way) >= wp.float64(0.0) or wp.dot(offset, offset) <= square
 
 
 @wp.func
-def sphere_entry(origin: wp.vec3, direction: wp.vec3, centre: wp.vec3, radius: float) -> float:
+def sphere_entry(origin: wp.vec3d, direction: wp.vec3, centre: wp.vec3d, radius: float) -> float:
     """Where a ray enters a sphere: t, 0 from inside, -1 if it misses it."""
-    offset = centre - origin
-    along = wp.dot(offset, direction)
-    aside = offset - along * direction
-    half_chord_squared = radius * radius - wp.dot(aside, aside)
-    if half_chord_squared < 0.0:
+    offset, way = centre - origin, as_double(direction)
+    length_squared = wp.dot(way, way)
+    aside = wp.cross(offset, way)
+    half_chord_squared = wp.float64(radius) * wp.float64(radius) * length_squared - wp.dot(aside, aside)
+    if half_chord_squared < wp.float64(0.0):
         return -1.0
-    half_chord = wp.sqrt(half_chord_squared)
-    if along + half_chord < 0.0:
+    along, half_chord = wp.dot(offset, way), wp.sqrt(half_chord_squared)
+    if along + half_chord < wp.float64(0.0):
         return -1.0
-    return wp.max(along - half_chord, 0.0)
+    return float(wp.max(along - half_chord, wp.float64(0.0)) / length_squared)

@@ -21,18 +21,20 @@ from pydantic.dataclasses import dataclass
 from ldtrefl.base import budget
 from ldtrefl.device import launch
 from ldtrefl.device.stats import Stats
+from ldtrefl.frame.bounces import summed_by_pixel
 from ldtrefl.frame.camera_shading import shade_gbuffer
-from ldtrefl.frame.gbuffer import GBuffer, GBufferView, pixel_surface, pixel_view
+from ldtrefl.frame.gbuffer import GBuffer
+from ldtrefl.frame.history import Reusable
+from ldtrefl.frame.reflected_light import ReflectedLight
 from ldtrefl.frame.visibility import draw_in_bands
 from ldtrefl.geometry.bilinear import bilinear_blend, neighbours_clamped
-from ldtrefl.methods.base import CONFIG, CommonConfig, Method
+from ldtrefl.methods.base import CONFIG, CommonConfig, RayMethod
 from ldtrefl.scene.description import Camera
-from ldtrefl.shading.specular import mirror_direction
 from ldtrefl.tracing.nothing import no_shadows
+from ldtrefl.tracing.ray_buffers import RayBuffer
 from ldtrefl.tracing.tracer import SceneTracer
 from ldtrefl.world.device_object import DeviceObject
 from ldtrefl.world.device_scene import DeviceScene
-from ldtrefl.world.records import ObjectRecord
 
 PIXEL_BYTES = 12
 """Of a cube map."""
@@ -87,25 +89,20 @@ def look_up(cube: wp.array(dtype=wp.vec3), resolution: int, direction: wp.vec3) 
 def reflect_cube(
     first: int,
     # In:
-    pixels: wp.array(dtype=wp.int32),
-    gbuffer: GBufferView,
-    objects: wp.array(dtype=ObjectRecord),
+    rays: RayBuffer,
     reflector: int,
     cube: wp.array(dtype=wp.vec3),
     resolution: int,
     # Out:
     radiance_out: wp.array(dtype=wp.vec3),
 ):
-    """Look up what one pixel reflects, if it sees this reflector."""
+    """Look up what one ray brings, if it leaves this reflector."""
     i = first + wp.tid()
-    pixel = pixels[i]
-    if gbuffer.object[pixel] == reflector:
-        view = pixel_view(gbuffer, objects, pixel)
-        surface = pixel_surface(gbuffer, objects, pixel, view)
-        radiance_out[i] = look_up(cube, resolution, mirror_direction(view.direction, surface.normal))
+    if rays.source[i] == reflector:
+        radiance_out[i] = look_up(cube, resolution, rays.direction[i])
 
 
-class EnvironmentMap(Method):
+class EnvironmentMap(RayMethod):
     """A cube map from each reflector's centre, looked up by direction: the classic baseline."""
 
     name = "envmap"
@@ -133,11 +130,14 @@ class EnvironmentMap(Method):
         super().place(scene)
         self._cubes.clear()
 
-    def reflect(self, gbuffer: GBuffer, stats: Stats) -> wp.array:
-        """Draw the cube maps on first need, then look up every reflector pixel."""
-        device, pixels = self.scene.device, gbuffer.reflector_pixels
-        radiance = wp.zeros(pixels.shape[0], dtype=wp.vec3, device=device)
-        seen = set(np.unique(gbuffer.view.object.numpy()[pixels.numpy()]).tolist())
+    def reflect_rays(
+        self, gbuffer: GBuffer, rays: RayBuffer, reusable: Reusable | None, stats: Stats
+    ) -> ReflectedLight:
+        """Draw the cube maps on first need, then look up the direction of every ray."""
+        device, count = self.scene.device, rays.pixel.shape[0]
+        radiance = wp.zeros(count, dtype=wp.vec3, device=device)
+        stats.count("rays", count)
+        seen = set(np.unique(rays.source.numpy()).tolist())
         up = tuple(self.scene.lighting.up)
         if up != self._up:
             # The environment stands up with the camera: every cube map shows it.
@@ -150,10 +150,9 @@ class EnvironmentMap(Method):
             if entry.index not in self._cubes:
                 self._cubes[entry.index] = self._draw_cube(entry, stats)
             with stats.stage("shade", device):
-                inputs = [pixels, gbuffer.view, self.scene.records, entry.index, self._cubes[entry.index]]
-                inputs += [self.config.resolution, radiance]
-                launch.launch(reflect_cube, pixels.shape[0], inputs, device)
-        return radiance
+                inputs = [rays, entry.index, self._cubes[entry.index], self.config.resolution, radiance]
+                launch.launch(reflect_cube, count, inputs, device)
+        return ReflectedLight(summed_by_pixel(gbuffer.reflector_pixels, rays, radiance))
 
     def _take_memory(self, cubes: int) -> None:
         """Ask for what so many more cube maps need, once for each reflector."""

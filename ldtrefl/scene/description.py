@@ -56,6 +56,9 @@ NARROWEST = 1e-6
 ROUNDING = 1e-6
 """By which albedo and mirror may add up to more than 1: 0.9 + 0.1 are written in decimals."""
 
+CORNERS = np.array(np.meshgrid([0, 1], [0, 1], [0, 1])).reshape(3, -1).T
+"""(8, 3): of a box's corners, along each axis 0 for its low and 1 for its high side."""
+
 _log = logging.getLogger("ldtrefl")
 
 
@@ -241,6 +244,12 @@ class Object:
         """
         return self._world_from_object.copy()
 
+    def world_corners(self) -> np.ndarray:
+        """(8, 3) float64: the corners of the object's own box, in the world."""
+        low, high = self.geometry.bounds
+        corners = np.where(CORNERS == 0, low, high)
+        return (np.hstack([corners, np.ones((8, 1))]) @ self._world_from_object.T)[:, :3]
+
     @functools.cached_property
     def _world_from_object(self) -> np.ndarray:
         low, high = self.geometry.bounds
@@ -321,9 +330,24 @@ class Scene:
     reflection: Reflection = Field(default_factory=Reflection)
     expect: dict[str, Expectation] = Field(default_factory=dict)
 
+    @functools.cached_property
+    def layout_box(self) -> np.ndarray:
+        """(2, 3) float64: the lowest and highest corner of the box about all objects in the world, as the scene was
+        laid out. Scenes that :meth:`with_camera` and :meth:`with_object` make of it keep that box, wherever objects
+        move."""
+        if not self.objects:
+            return np.array([[-1.0] * 3, [1.0] * 3])
+        corners = np.concatenate([entry.world_corners() for entry in self.objects])
+        return np.stack([corners.min(axis=0), corners.max(axis=0)])
+
+    def _laid_out_alike(self, other: Scene) -> Scene:
+        """A scene that comes from this one, with its ``layout_box``."""
+        vars(other)["layout_box"] = self.layout_box
+        return other
+
     def with_camera(self, camera: Camera) -> Scene:
         """The same scene seen by another camera."""
-        return dataclasses.replace(self, camera=camera)
+        return self._laid_out_alike(dataclasses.replace(self, camera=camera))
 
     def number_of(self, name: str) -> int:
         """The number of the object called ``name``, the first of several.
@@ -353,7 +377,8 @@ class Scene:
             raise error.within(f"object '{name}'") from None
         if not {"mesh", "shape", "params"} & set(changes):
             changed.__dict__["geometry"] = self.objects[number].geometry  # not made again
-        return dataclasses.replace(self, objects=(*self.objects[:number], changed, *self.objects[number + 1 :]))
+        objects = (*self.objects[:number], changed, *self.objects[number + 1 :])
+        return self._laid_out_alike(dataclasses.replace(self, objects=objects))
 
     @property
     def environment_image(self) -> StoredPicture | None:

@@ -7,7 +7,6 @@ import warp as wp
 
 from ldtrefl.device import launch
 from ldtrefl.geometry.sphere import meets_sphere, sphere_entry
-from ldtrefl.geometry.vectors import as_single
 from ldtrefl.tracing.hit import Hit
 from ldtrefl.tracing.object_sets import ObjectSets, has_bit, lowest_bit, object_bits, without
 from ldtrefl.tracing.ray_buffers import HitBuffer, RayBuffer, keep_nearer, set_miss
@@ -32,7 +31,7 @@ def bits_without_source(
 
 @wp.func
 def first_entered(
-    objects: wp.array(dtype=ObjectRecord), bits: wp.uint32, word: int, origin: wp.vec3, direction: wp.vec3
+    objects: wp.array(dtype=ObjectRecord), bits: wp.uint32, word: int, origin: wp.vec3d, direction: wp.vec3
 ) -> int:
     """Of the objects of a word of bits, the one whose bounding sphere a ray enters first; if it enters none, any."""
     first = 32 * word + lowest_bit(bits)
@@ -53,10 +52,9 @@ def first_entered(
 @wp.func
 def may_meet(record: ObjectRecord, origin: wp.vec3d, direction: wp.vec3, t_max: float) -> bool:
     """Whether a ray enters the bounding sphere of an object before ``t_max``."""
-    start = as_single(origin)
     if t_max == wp.inf:
-        return meets_sphere(start, direction, record.centre, record.radius)  # needs no root
-    entry = sphere_entry(start, direction, record.centre, record.radius)
+        return meets_sphere(origin, direction, record.centre, record.radius)  # needs no root
+    entry = sphere_entry(origin, direction, record.centre, record.radius)
     return entry >= 0.0 and entry <= t_max
 
 
@@ -121,7 +119,7 @@ def closest_hits_kernel(tracer: Tracer, block: int, bounds: bool = True) -> wp.K
                 if rays.source[i] >= 0:
                     left = left | bits_without_source(sets, objects, rays.source[i], i, word)
             while left != wp.uint32(0):
-                k = first_entered(objects, left, word, as_single(rays.origin[lead]), rays.direction[lead])
+                k = first_entered(objects, left, word, rays.origin[lead], rays.direction[lead])
                 left = without(left, k)
 
                 # Ask for the rays that may meet it.

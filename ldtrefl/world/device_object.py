@@ -112,7 +112,7 @@ def set_material(
     record.decoded = decoded
 
 
-def bounding_sphere(mesh: Mesh, device_from_unit: np.ndarray) -> tuple[wp.vec3, float]:
+def bounding_sphere(mesh: Mesh, device_from_unit: np.ndarray) -> tuple[wp.vec3d, float]:
     """(centre, radius) in device space, about the box's centre, padded for the rounding of what rays are tested with:
     float32 in the device's box."""
     centre = device_from_unit[:3, 3]
@@ -120,4 +120,4 @@ def bounding_sphere(mesh: Mesh, device_from_unit: np.ndarray) -> tuple[wp.vec3, 
     points = np.einsum("ij,kj->ik", mesh.unit_vertices.astype(float), device_from_unit[:3, :3])
     used = points[mesh.is_used]
     radius = float(np.sqrt((used**2).sum(axis=1).max()))
-    return wp.vec3(*centre), radius * SPHERE_WIDENING + SPHERE_PADDING
+    return wp.vec3d(*centre), radius * SPHERE_WIDENING + SPHERE_PADDING

@@ -18,7 +18,7 @@ from ldtrefl.scene.description import Camera, Scene
 from ldtrefl.world.camera import unit_up
 from ldtrefl.world.device_mesh import DeviceMesh
 from ldtrefl.world.device_object import DeviceObject, set_geometry, set_material, world_from_unit
-from ldtrefl.world.device_space import device_space, world_corners
+from ldtrefl.world.device_space import device_space
 from ldtrefl.world.lighting import lighting_of
 from ldtrefl.world.records import LightingRecord, ObjectRecord
 
@@ -39,8 +39,7 @@ class DeviceScene:
         self.device = device
         self._skip_attributes = skip_attributes
         self._decoded = wp.array(decoded_bytes(), dtype=float, device=device, copy=False)
-        self._corners = self._world_corners(before)
-        self.device_from_world = device_space(self._corners)
+        self.device_from_world = device_space(scene.layout_box)
         self.triangle_count, self.vertex_count = self._counts()
         self.objects = self._placed_objects(before)
         self.records = wp.array([entry.record for entry in self.objects], dtype=ObjectRecord, device=device)
@@ -50,16 +49,6 @@ class DeviceScene:
             scene, self.device_from_world, self._decoded, device, lighting_before
         )
         self.look_from(scene.camera)
-
-    def _world_corners(self, before: DeviceScene | None) -> np.ndarray:
-        """(objects, 8, 3) float64, of the objects' boxes in the world."""
-        if before is None:
-            return np.array([world_corners(source) for source in self.scene.objects]).reshape(-1, 8, 3)
-        corners = before._corners.copy()
-        for index, (source, former) in enumerate(zip(self.scene.objects, before.objects, strict=True)):
-            if former.source is not source:
-                corners[index] = world_corners(source)
-        return corners
 
     def _counts(self) -> tuple[int, int]:
         """(triangles, vertices) of all objects.
@@ -77,9 +66,8 @@ class DeviceScene:
         return triangles, vertices
 
     def _placed_objects(self, before: DeviceScene | None) -> list[DeviceObject]:
-        """The objects in device space, those that stand where they stood taken over."""
+        """The objects in device space, those that stand where they stood taken over: device space is the same."""
         former = [] if before is None else before.objects
-        same_space = before is not None and np.array_equal(self.device_from_world, before.device_from_world)
         meshes = {entry.geometry.mesh.key: entry.geometry for entry in former}
         placed: list[DeviceObject] = []
         first_triangle = first_vertex = 0
@@ -88,7 +76,7 @@ class DeviceScene:
             if key not in meshes:
                 meshes[key] = DeviceMesh(source.geometry, self.device)
             geometry = meshes[key]
-            if same_space and former[index].source is source:
+            if former and former[index].source is source:
                 placed.append(former[index])
             else:
                 record, matrix = ObjectRecord(), world_from_unit(source, geometry.mesh)
@@ -121,11 +109,8 @@ class DeviceScene:
         firsts = np.cumsum([0, *counts])
         return wp.array(firsts[:-1].astype(np.int32), dtype=wp.int32, device=self.device), int(firsts[-1])
 
-    def moved_since(self, before: DeviceScene) -> frozenset[int] | None:
-        """Numbers of the objects that have moved since a scene that this one comes from; None if all may look different
-        in device space, because it is another one."""
-        if not np.array_equal(self.device_from_world, before.device_from_world):
-            return None
+    def moved_since(self, before: DeviceScene) -> frozenset[int]:
+        """Numbers of the objects that have moved since a scene that this one comes from."""
         return frozenset(now.index for now, then in zip(self.objects, before.objects, strict=True) if now is not then)
 
     def look_from(self, camera: Camera) -> None:

@@ -25,7 +25,7 @@ class ObjectRecord:
     unit_from_direction: wp.mat33  # the linear part of unit_from_device, over unit_per_device
     unit_per_device: float  # a power of two, so that squares stay in float32's range however small the object is
     normal_from_unit: wp.mat33  # inverse transpose of device_from_unit's linear part
-    centre: wp.vec3  # bounding sphere, device space
+    centre: wp.vec3d  # bounding sphere, device space
     radius: float
     first_triangle: int  # number of triangle 0 among all objects' triangles
     first_vertex: int  # and of vertex 0 among all objects' vertices

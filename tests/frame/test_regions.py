@@ -82,7 +82,7 @@ def test_no_ray_is_lost(bend: float) -> None:
     objects = []
     for c, r in zip(centre, radius, strict=True):
         record = ObjectRecord()
-        record.centre, record.radius = wp.vec3(*c), float(r) * (1 + 1e-5)  # as in a scene
+        record.centre, record.radius = wp.vec3d(*c), float(r) * (1 + 1e-5)  # as in a scene
         objects.append(record)
     records = wp.array(objects, dtype=ObjectRecord, device=device)
     bits = wp.empty((len(origins), (SPHERES + 31) // 32), dtype=wp.uint32, device=device)
