@@ -31,7 +31,8 @@ if TYPE_CHECKING:
     from ldtrefl.device.progress import progress_to
     from ldtrefl.device.stats import Stats
     from ldtrefl.files.map_cache import MapCache, keep_maps_in
-    from ldtrefl.files.pictures import load_image, save_image
+    from ldtrefl.files.picture_reading import load_image
+    from ldtrefl.files.picture_writing import save_image
     from ldtrefl.ldt.texture import LayeredDepthTexture, peel
     from ldtrefl.renderer import Frame, Renderer, render
     from ldtrefl.scene.description import (
@@ -99,13 +100,13 @@ _HOMES = {
     "Scene": "scene.description",
     "Stats": "device.stats",
     "keep_maps_in": "files.map_cache",
-    "load_image": "files.pictures",
+    "load_image": "files.picture_reading",
     "load_mesh": "scene.readers.mesh_files",
     "load_scene": "scene.description",
     "peel": "ldt.texture",
     "progress_to": "device.progress",
     "render": "renderer",
-    "save_image": "files.pictures",
+    "save_image": "files.picture_writing",
     "set_memory_limit": "base.budget",
     "set_threads": "device.launch",
 }

@@ -27,7 +27,7 @@ from timing import in_turn
 import ldtrefl
 from ldtrefl.base.errors import InputError
 from ldtrefl.device import launch
-from ldtrefl.files.whole import written_whole
+from ldtrefl.files.atomic_write import written_whole
 from ldtrefl.frame import skips
 from ldtrefl.frame.camera_shading import shade_gbuffer
 from ldtrefl.renderer import Frame, Renderer

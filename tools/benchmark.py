@@ -40,7 +40,7 @@ from benchmark_parts.tracing import Plan, rays_line, rays_on_mesh
 
 import ldtrefl
 from ldtrefl.base.errors import InputError
-from ldtrefl.files.whole import written_whole
+from ldtrefl.files.atomic_write import written_whole
 
 TRACERS = (*OURS, *RIVALS)
 ALL_TRACERS = ", ".join(tracer.name for tracer in TRACERS)

@@ -22,7 +22,7 @@ from types import ModuleType
 from stress_cases.outcomes import Outcome, as_dict
 
 from ldtrefl.base.errors import InputError
-from ldtrefl.files.whole import written_whole
+from ldtrefl.files.atomic_write import written_whole
 
 
 @dataclass(frozen=True)

@@ -26,12 +26,13 @@ from ldtrefl.base import budget
 from ldtrefl.base.errors import InputError, printable
 from ldtrefl.base.standard_error import log_on_stderr
 from ldtrefl.compare import metrics
+from ldtrefl.compare.difference import difference_image
 from ldtrefl.compare.layer_picture import draw_layers
 from ldtrefl.device import launch
 from ldtrefl.device.progress import progress_to
+from ldtrefl.files.atomic_write import writable_folder, written_whole
 from ldtrefl.files.map_cache import MapCache, keep_maps_in
-from ldtrefl.files.pictures import check_writable, difference_image, save_image
-from ldtrefl.files.whole import writable_folder, written_whole
+from ldtrefl.files.picture_writing import check_writable, save_image
 from ldtrefl.ldt.texture import DEFAULT_RESOLUTION, peel_mesh
 from ldtrefl.methods import all_methods, find_method
 from ldtrefl.renderer import Frame, Renderer

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from ldtrefl.files.pictures import linear_from_srgb
+from ldtrefl.files.srgb import linear_from_srgb
 from ldtrefl.ldt.texel_frame import FACE_NAMES
 from ldtrefl.ldt.texture import LayeredDepthTexture
 

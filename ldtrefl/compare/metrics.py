@@ -12,7 +12,7 @@ import flip_evaluator
 import numpy as np
 from skimage.metrics import structural_similarity
 
-from ldtrefl.files.pictures import srgb_from_linear
+from ldtrefl.files.srgb import srgb_from_linear
 from ldtrefl.frame.first_hits import FirstHits
 from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.tracing.ray_buffers import distance_across

@@ -11,7 +11,7 @@ import numpy as np
 
 from ldtrefl.base import budget
 from ldtrefl.base.errors import InputError
-from ldtrefl.files.whole import open_plain
+from ldtrefl.files.trusted_files import open_plain
 
 Expected = dict[str, tuple[Any, tuple[int | None, ...]]]
 """Name of an array -> its type and shape, None where any number will do."""

@@ -14,10 +14,11 @@ from pydantic import BeforeValidator, Field, PlainValidator, TypeAdapter, Valida
 from ldtrefl.base.checked import plain
 from ldtrefl.base.errors import InputError, first_fault, unknown_name
 from ldtrefl.device import launch
+from ldtrefl.files.atomic_write import written_whole
 from ldtrefl.files.fingerprint import fingerprint
-from ldtrefl.files.map_cache import Entry, current_cache, key_of
+from ldtrefl.files.map_cache import current_cache, key_of
+from ldtrefl.files.map_file import Entry
 from ldtrefl.files.npz import read_arrays
-from ldtrefl.files.whole import written_whole
 from ldtrefl.ldt.exact.check import check_tree
 from ldtrefl.ldt.exact.items import tree_of
 from ldtrefl.ldt.exact.record_choice import Quality

@@ -40,7 +40,7 @@ from ldtrefl.base.checked import (
     refusing_in_one_line,
 )
 from ldtrefl.base.errors import InputError, first_fault, printable, unknown_name
-from ldtrefl.files.pictures import stored_picture
+from ldtrefl.files.picture_reading import stored_picture
 from ldtrefl.files.stored_picture import StoredPicture
 from ldtrefl.scene import shapes
 from ldtrefl.scene.mesh import Mesh

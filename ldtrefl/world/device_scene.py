@@ -13,7 +13,7 @@ import numpy as np
 import warp as wp
 
 from ldtrefl.base.errors import InputError
-from ldtrefl.files.pictures import decoded_bytes
+from ldtrefl.files.srgb import linear_of_bytes
 from ldtrefl.scene.description import Camera, Scene
 from ldtrefl.world.camera import unit_up
 from ldtrefl.world.device_mesh import DeviceMesh
@@ -38,7 +38,7 @@ class DeviceScene:
         self.scene = scene
         self.device = device
         self._skip_attributes = skip_attributes
-        self._decoded = wp.array(decoded_bytes(), dtype=float, device=device, copy=False)
+        self._decoded = wp.array(linear_of_bytes(), dtype=float, device=device, copy=False)
         self.device_from_world = device_space(scene.layout_box)
         self.triangle_count, self.vertex_count = self._counts()
         self.objects = self._placed_objects(before)

@@ -9,7 +9,7 @@ import matplotlib
 import numpy as np
 from timing import Summary
 
-from ldtrefl.files.whole import written_whole
+from ldtrefl.files.atomic_write import written_whole
 
 from .models import KNOTS
 from .result import ErrorPoint, Result

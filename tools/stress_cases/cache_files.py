@@ -26,7 +26,8 @@ import xxhash
 
 import ldtrefl
 from ldtrefl.device import launch
-from ldtrefl.files.map_cache import HEADER, MAGIC, Entry, MapCache, keep_maps_in
+from ldtrefl.files.map_cache import MapCache, keep_maps_in
+from ldtrefl.files.map_file import HEADER, MAGIC, Entry
 from ldtrefl.ldt.texture import peel_mesh
 from ldtrefl.scene import shapes
 from ldtrefl.world.device_mesh import DeviceMesh
@@ -74,6 +75,7 @@ def run(rays: int, pictures: int) -> list[Outcome]:
             truth = answers()[1]
             key = cache.files()[0][0].stem
             good = cache.load(key)
+            assert good is not None
             assert answers() == (True, truth)
             # The file that is mapped here is replaced, never written into.
             every = list(spoiled_fields(good.arrays, good.values))

@@ -14,7 +14,7 @@ import OpenImageIO as oiio
 
 import ldtrefl
 from ldtrefl.files.map_cache import MapCache
-from ldtrefl.files.pictures import load_image
+from ldtrefl.files.picture_reading import load_image
 from ldtrefl.scene import shapes
 
 from .outcomes import Outcome

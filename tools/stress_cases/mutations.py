@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 import xxhash
 
-from ldtrefl.files.map_cache import HEADER
+from ldtrefl.files.map_file import HEADER
 
 from .good_files import LOOP
 

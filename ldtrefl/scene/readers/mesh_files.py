@@ -25,8 +25,8 @@ from trimesh.exchange.load import mesh_formats, mesh_loaders
 from ldtrefl.base import budget
 from ldtrefl.base.errors import InputError
 from ldtrefl.base.sharing import shared_while_used
+from ldtrefl.files.mesh_textures import stored_texture, take_memory_for_textures, texture_of
 from ldtrefl.files.pillow_limit import no_pixel_limit
-from ldtrefl.files.pillow_pictures import picture_of, stored_from_pillow, take_pictures
 from ldtrefl.files.stored_picture import StoredPicture
 from ldtrefl.scene.mesh import Mesh, Part
 from ldtrefl.scene.normals import split_by_side
@@ -110,7 +110,7 @@ def _load_mesh(path: str, _modified: int, _size: int) -> Mesh:
                 asked += needed
             if not pieces:
                 raise InputError("the mesh has no triangles")
-            take_pictures([_material(piece) for piece in _one_of_each_material(pieces)[0]])
+            take_memory_for_textures([_material(piece) for piece in _one_of_each_material(pieces)[0]])
             # What was asked for to read the file is free again.
             budget.take(max(0.0, _joining_bytes(pieces) - asked), "its mesh")
             return _joined(pieces)
@@ -345,5 +345,5 @@ def _look(piece: _Piece) -> tuple[tuple[float, float, float], StoredPicture | No
         scale = 255.0 if np.asarray(factor).dtype.kind in "iu" else 1.0
         r, g, b = (float(channel) / scale for channel in np.asarray(factor)[:3])
         color = (r, g, b)
-    picture = picture_of(material)
-    return color, None if picture is None else stored_from_pillow(picture)
+    picture = texture_of(material)
+    return color, None if picture is None else stored_texture(picture)

@@ -1,48 +1,53 @@
-"""Pictures that the readers of mesh files hand over, as Pillow opened them, made stored pictures."""
+"""Textures of mesh files: Pillow pictures, as the readers of meshes open them -> stored pictures.
+
+A stored picture is explained in ``stored_picture.py``.
+"""
 
 from __future__ import annotations
 
 import weakref
-from typing import Any
+from collections.abc import Iterable
 
 import numpy as np
 from PIL import Image
 
 from ldtrefl.base import budget
 from ldtrefl.base.errors import InputError
-from ldtrefl.files.pictures import linear_from_srgb
+from ldtrefl.files.srgb import linear_from_srgb
 from ldtrefl.files.stored_picture import StoredPicture
 
 BYTES_A_PIXEL = 4 + 4 + 3
-"""What Pillow takes to unpack a picture, what trimesh does to copy it, and what is kept of it."""
+"""What Pillow takes to unpack a picture, what trimesh takes to copy it, and what is kept of it."""
 
 ROWS_AT_ONCE = 256
+"""Rows of a picture that are converted at a time."""
 
-_by_content: weakref.WeakValueDictionary[str, StoredPicture] = weakref.WeakValueDictionary()
+_shared: weakref.WeakValueDictionary[str, StoredPicture] = weakref.WeakValueDictionary()
+"""Key of a stored picture -> that picture, while anybody holds it."""
 
 
-def picture_of(material: Any) -> Image.Image | None:
-    """The picture of a mesh file's base colour; None without one."""
+def texture_of(material: object) -> Image.Image | None:
+    """The picture of the base colour of one of trimesh's materials; None if it has none."""
     return getattr(material, "baseColorTexture", None) or getattr(material, "image", None)
 
 
-def take_pictures(materials: list[Any]) -> None:
-    """Ask for the memory of the pictures of materials, of each as often as it is there, before any is unpacked.
+def take_memory_for_textures(materials: Iterable[object]) -> None:
+    """Ask for the memory of the pictures of materials before any is unpacked. A picture counts once per material.
 
     Raises:
         InputError: it is more than is allowed.
     """
-    for picture in map(picture_of, materials):
+    for picture in map(texture_of, materials):
         if picture is not None:
             width, height = picture.size
             what = f"a texture of {width} x {height} pixels"
             budget.take(width * height * BYTES_A_PIXEL, what, "a smaller texture")
 
 
-def stored_from_pillow(picture: Image.Image) -> StoredPicture:
-    """A stored picture: uint8, or float32 of pictures of more than 8 bits.
+def stored_texture(picture: Image.Image) -> StoredPicture:
+    """Convert to a stored picture: of uint8, or of float32 if the picture has more than 8 bits.
 
-    Alpha is left out, and colours are not multiplied by it. For pictures that are the same, the same one is returned.
+    Alpha is left out, and colours are not multiplied by it. Equal pictures give the same object.
 
     Raises:
         InputError: the picture is cut off or damaged.
@@ -61,4 +66,4 @@ def stored_from_pillow(picture: Image.Image) -> StoredPicture:
     except Exception as error:  # whatever a damaged picture provokes in a reader is the picture's fault
         raise InputError(f"a texture is cut off or damaged ({error})") from error
     made = StoredPicture(stored)
-    return _by_content.setdefault(made.key, made)
+    return _shared.setdefault(made.key, made)

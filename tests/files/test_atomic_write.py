@@ -12,8 +12,8 @@ import pytest
 
 import ldtrefl
 from ldtrefl.cli.commands import main
+from ldtrefl.files.atomic_write import written_whole
 from ldtrefl.files.map_cache import MapCache
-from ldtrefl.files.whole import written_whole
 from ldtrefl.scene import shapes
 from tests.conftest import SMALL_SCENE
 
@@ -135,7 +135,7 @@ import numpy as np
 import ldtrefl
 from pathlib import Path
 sys.path.insert(0, {root!r})
-from tests.files.test_whole import WRITERS
+from tests.files.test_atomic_write import WRITERS
 for name, write in WRITERS.items():
     for limit in (0, 1, 5000, 20_000):
         resource.setrlimit(resource.RLIMIT_FSIZE, (limit, resource.RLIM_INFINITY))

@@ -1,4 +1,4 @@
-"""Files that are written whole or not at all, folders that can be written, and files that are read with caution."""
+"""Files that are written whole or not at all, and what can be written: files that may be replaced, folders."""
 
 from __future__ import annotations
 
@@ -19,14 +19,16 @@ LONGEST_STEM = 32
 
 @contextmanager
 def written_whole(path: str | Path, *, private: bool = False) -> Iterator[Path]:
-    """A file beside ``path``, with its ending, that takes its place at the end of this block, or is gone.
+    """A scratch file beside ``path``, with its ending, to be written in this block. Then it takes ``path``'s place.
 
-    A link is followed: its target is replaced, but in a cache the link itself. A file that is there already keeps its
-    permissions, and its owner if that can be. The data are on the disk before the file takes its place.
+    If the block raises, the scratch file is removed and ``path`` stays as it was. If ``path`` is a link, its target is
+    replaced. A file that is replaced hands on its permissions, and its owner where that is allowed. The data are on the
+    disk before the file takes its place.
 
     Args:
         path: where the file shall be.
-        private: a file of a cache, that nobody else may read, and that can be made again: it is not waited for.
+        private: the file belongs to a cache. Nobody else may read it; a link in its place is itself replaced; the
+            program does not wait until it is on the disk, as it can be made again.
 
     Raises:
         InputError: it cannot be written.
@@ -52,7 +54,7 @@ def written_whole(path: str | Path, *, private: bool = False) -> Iterator[Path]:
 
 
 def replaceable(path: str | Path) -> Path:
-    """The plain file that writing to ``path`` would replace, or make: the target of a link.
+    """The plain file that writing to ``path`` would replace or make: if ``path`` is a link, its target.
 
     Raises:
         InputError: a folder, a pipe or a device is in its place, or the file may not be written.
@@ -74,7 +76,7 @@ def replaceable(path: str | Path) -> Path:
 
 
 def writable_folder(folder: Path, *, make: bool = False) -> Path:
-    """``folder``, made if it may be.
+    """``folder``, if files can be written there; with ``make`` it is made where it is missing.
 
     Raises:
         InputError: it cannot be made or written.
@@ -89,51 +91,8 @@ def writable_folder(folder: Path, *, make: bool = False) -> Path:
     return folder
 
 
-def private_folder(folder: Path) -> Path:
-    """``folder``, which only this user may write; made, with access for nobody else, where it is missing.
-
-    Raises:
-        InputError: it cannot be made or written, it is another user's, or others may write into it.
-    """
-    try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        with contextlib.suppress(FileExistsError):
-            folder.mkdir(mode=0o700)
-        fault = changed_by_others(folder.stat())
-    except OSError as error:
-        raise InputError(f"{folder}: the folder cannot be written ({error.strerror})") from error
-    if fault:
-        raise InputError(f"{folder}: {fault}; a folder for maps is its user's alone (mode 0700)")
-    return writable_folder(folder)
-
-
-def changed_by_others(status: os.stat_result) -> str:
-    """Why somebody else could change what this is the status of; "" if nobody could. Without users nobody can."""
-    if hasattr(os, "geteuid"):
-        if status.st_uid != os.geteuid():
-            return "belongs to another user"
-        if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
-            return "can be written by others"
-    return ""
-
-
-def open_plain(path: str | Path, *, follow: bool = True) -> int:
-    """A file descriptor for reading a plain file. A pipe is not waited for, and a link is followed if it may be.
-
-    Raises:
-        OSError: it cannot be opened.
-        ValueError: it is not a plain file, or ``path`` is no name.
-    """
-    flags = [] if follow else ["O_NOFOLLOW"]
-    descriptor = os.open(path, sum(getattr(os, flag, 0) for flag in ["O_RDONLY", "O_NONBLOCK", "O_BINARY", *flags]))
-    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
-        os.close(descriptor)
-        raise ValueError("not a plain file")
-    return descriptor
-
-
 def _new_file_beside(target: Path, mode: int) -> Path:
-    """A new, empty file with ``target``'s ending, of this mode but for what the process' mask takes away."""
+    """A new, empty file with ``target``'s ending; its mode is ``mode`` less the process' umask."""
     while True:
         name = f".{target.stem[:LONGEST_STEM]}-{secrets.token_hex(4)}{target.suffix}"
         with contextlib.suppress(FileExistsError):
@@ -142,14 +101,13 @@ def _new_file_beside(target: Path, mode: int) -> Path:
 
 
 def _take_permissions(scratch: Path, target: Path) -> None:
-    """Give ``scratch`` the permissions of the file that it replaces, if there is one, and its owner if that can be."""
+    """Give ``scratch`` the permissions, and where that is allowed the owner, of the file that it replaces, if any."""
     with contextlib.suppress(FileNotFoundError):
-        kept = target.stat()
-        own = scratch.stat()
-        if (own.st_uid, own.st_gid) != (kept.st_uid, kept.st_gid):
+        old, new = target.stat(), scratch.stat()
+        if (new.st_uid, new.st_gid) != (old.st_uid, old.st_gid):
             with contextlib.suppress(OSError):
-                os.chown(scratch, kept.st_uid, kept.st_gid)
-        scratch.chmod(stat.S_IMODE(kept.st_mode))
+                os.chown(scratch, old.st_uid, old.st_gid)
+        scratch.chmod(stat.S_IMODE(old.st_mode))
 
 
 def _sync(path: Path, access: int) -> None:

@@ -11,14 +11,13 @@ from typing import Any
 import numpy as np
 import OpenImageIO as oiio
 import pytest
-import trimesh
 from PIL import Image, PngImagePlugin
 
 import ldtrefl
 from ldtrefl import InputError, load_image
 from ldtrefl.base import budget
-from ldtrefl.files.pictures import linear_from_srgb, stored_picture
-from ldtrefl.files.pillow_pictures import stored_from_pillow
+from ldtrefl.files.picture_reading import stored_picture
+from ldtrefl.files.srgb import linear_from_srgb
 from ldtrefl.files.stored_picture import StoredPicture
 from ldtrefl.scene import shapes
 from ldtrefl.scene.description import Camera, Environment, Material, Object, Scene
@@ -112,9 +111,8 @@ def test_a_palette_with_clear_colors(tmp_path: Path) -> None:
     picture = Image.new("P", (6, 4))
     picture.putpalette([*COLOR, *(0, 0, 0) * 255])
     picture.save(tmp_path / "a.png", transparency=bytes([128] * 256))
-    np.testing.assert_array_equal(
-        stored_picture(tmp_path / "a.png").pixels, np.broadcast_to(np.uint8(COLOR), (4, 6, 3))
-    )
+    stored = stored_picture(tmp_path / "a.png").pixels
+    np.testing.assert_array_equal(stored, np.broadcast_to(np.uint8(COLOR), (4, 6, 3)))
 
 
 @pytest.mark.parametrize("name", ["grey.png", "rgb.png", "rgb.tif"])
@@ -255,7 +253,7 @@ def test_pictures_that_are_unpacked_when_they_are_opened(tmp_path: Path, small_l
 PEAK = """
 import sys
 from pathlib import Path
-from ldtrefl.files.pictures import stored_picture
+from ldtrefl.files.picture_reading import stored_picture
 peak = lambda: int(Path("/proc/self/status").read_text().split("VmHWM:")[1].split()[0]) << 10
 own = peak()
 picture = stored_picture(sys.argv[1]).pixels
@@ -271,39 +269,24 @@ def test_eight_bits_take_three_bytes_a_pixel(tmp_path: Path) -> None:
     assert 2.9 < float(done.stdout) < 3.5
 
 
-def write_glb(path: Path, picture: Image.Image) -> None:
-    plane = shapes.make("plane", {})
-    material = trimesh.visual.material.PBRMaterial(baseColorTexture=picture)
-    visual = trimesh.visual.TextureVisuals(uv=plane.uvs, material=material)
-    trimesh.Trimesh(plane.vertices, plane.faces, visual=visual, process=False).export(path)
-
-
-@pytest.mark.parametrize("mode", ["RGB", "RGBA", "LA", "P"])
-def test_textures_of_a_glb(tmp_path: Path, mode: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Pillow's own limit, which readers take for a missing picture, is not ours."""
-    pixels = np.random.default_rng(0).integers(0, 256, (64, 48, 4), dtype=np.uint8)
-    picture = Image.fromarray(pixels).convert("LA" if mode == "LA" else "RGBA")
-    picture = picture.convert("RGB").convert(mode) if mode in ("RGB", "P") else picture
-    write_glb(tmp_path / "a.glb", picture)
-    monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 100)
-    texture = ldtrefl.load_mesh(tmp_path / "a.glb").parts[0].texture
-    assert texture is not None and texture.pixels.dtype == np.uint8
-    monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", None)
-    np.testing.assert_array_equal(texture.pixels, np.asarray(picture.convert("RGB")))
-    assert Image.MAX_IMAGE_PIXELS is None
-
-
-def test_sixteen_bits_of_a_mesh_are_scaled_and_the_same_picture_is_one(tmp_path: Path) -> None:
-    values = np.arange(24, dtype=np.uint16).reshape(4, 6) * 2700 + 11
-    Image.fromarray(values).save(tmp_path / "a.png")
-    read = [stored_from_pillow(Image.open(tmp_path / "a.png")) for _ in range(2)]
-    assert read[0] is read[1] and not read[0].pixels.flags.writeable
-    np.testing.assert_array_equal(read[0].pixels, load_image(tmp_path / "a.png"))
-
-
-def test_a_glb_of_large_textures_is_asked_for_first(tmp_path: Path, small_limit: int) -> None:
-    write_glb(tmp_path / "a.glb", Image.new("RGB", (400, 400), COLOR))
-    with pytest.raises(
-        InputError, match=r"a\.glb: a texture of 400 x 400 pixels needs 1\.7 MiB.*, allowed are 1\.0 MiB"
+def test_pictures_that_cannot_be_read(tmp_path: Path) -> None:
+    pixels = np.random.default_rng(0).integers(0, 256, (64, 64, 3), dtype=np.uint8)
+    Image.fromarray(pixels).save(tmp_path / "a.png")
+    whole = (tmp_path / "a.png").read_bytes()
+    for length, fault in (
+        (0, "not a picture"),
+        (10, "not a picture"),
+        (40, "not a picture"),
+        (len(whole) // 2, "cut off"),
     ):
-        ldtrefl.load_mesh(tmp_path / "a.glb")
+        (tmp_path / "cut.png").write_bytes(whole[:length])
+        with pytest.raises(InputError, match=rf"cut\.png: .*{fault}"):
+            load_image(tmp_path / "cut.png")
+    with pytest.raises(InputError, match="no such picture"):
+        load_image(tmp_path / "none.png")
+
+
+@pytest.mark.parametrize("mode", ["L", "P", "RGBA", "1", "LA"])
+def test_every_kind_of_png_is_read_as_rgb(tmp_path: Path, mode: str) -> None:
+    Image.fromarray(np.full((4, 6, 3), 255, np.uint8)).convert(mode).save(tmp_path / "a.png")
+    np.testing.assert_allclose(load_image(tmp_path / "a.png"), np.ones((4, 6, 3)), atol=1e-6)
