@@ -1,4 +1,5 @@
-"""Pure functions of geometry for kernels: vectors, triangles, spheres, and the two rasterisers.
+"""Pure functions of geometry for kernels: vectors, triangles, spheres, boxes, bilinear lookups, and two rasterisers.
 
-Imports nothing of the package. Start with ``triangle.py``.
+Imports nothing of the package. Start with ``triangle.py``; ``fixed_raster.py`` draws maps, ``perspective_raster.py``
+draws what the camera sees.
 """

@@ -1,9 +1,10 @@
 """The orthographic rasteriser: which texels a triangle covers that is projected along an axis, exactly.
 
-Corners are snapped to fixed point and edge functions are evaluated in int64, so they have no rounding. A texel centre
-on an edge goes to one side by the top-left rule (a consistent infinitesimal shift). Triangles that share an edge
-therefore neither overlap nor leave a crack, and every texel centre inside the projection of a closed mesh is covered an
-even number of times, on any machine.
+Texel (u, v) reaches from u to u + 1 and from v to v + 1, its centre is in the middle. Corners are snapped to fixed
+point, and edge functions (Pineda 1988) are evaluated in int64 without rounding. A texel centre on an edge belongs to
+one side of it by the top-left rule, as if all centres were shifted by the same infinitesimal step. So triangles that
+share an edge neither overlap nor leave a crack, and every texel centre inside the projection of a closed mesh is
+covered an even number of times, on any machine.
 """
 
 from __future__ import annotations
@@ -11,17 +12,22 @@ from __future__ import annotations
 import warp as wp
 
 SUBTEXEL_BITS = wp.constant(16)
-"""Fixed-point digits of a texel: finer than float32 at 256; 4096 texels fit in int32, their edge functions in int64."""
+"""Binary digits after the point of a fixed-point coordinate in texels. They are finer than float32 from 256 on. With
+them coordinates up to 4096 texels fit in int32, and their edge functions in int64."""
 SUBTEXELS = wp.constant(wp.float64(1 << SUBTEXEL_BITS))
-TEXEL_OF_SUBTEXEL = wp.constant(0.5**16)
+"""Fixed-point steps in a texel."""
+TEXELS_PER_SUBTEXEL = wp.constant(0.5**SUBTEXEL_BITS)
+"""A fixed-point step in texels."""
 TEXEL = wp.constant(wp.int64(1 << SUBTEXEL_BITS))
-HALF_TEXEL_32 = wp.constant(1 << (SUBTEXEL_BITS - 1))
+"""A texel in fixed point."""
 HALF_TEXEL = wp.constant(wp.int64(1 << (SUBTEXEL_BITS - 1)))
+HALF_TEXEL_32 = wp.constant(1 << (SUBTEXEL_BITS - 1))
+"""Half a texel in fixed point, as int64 and as int32."""
 
 
 @wp.struct
 class FixedTriangle:
-    """A triangle projected along an axis, counter-clockwise, in fixed point; and the texels it may cover."""
+    """A projected triangle in fixed point, its corners counter-clockwise, and the texels that it may cover."""
 
     ax: wp.int64
     ay: wp.int64
@@ -29,41 +35,44 @@ class FixedTriangle:
     by: wp.int64
     cx: wp.int64
     cy: wp.int64
-    area: wp.int64  # twice the area; 0 if nothing is covered
-    flipped: int  # 1 if corners b and c were exchanged to turn counter-clockwise
-    first_u: int
+    area: wp.int64  # twice the area; 0 if no texel centre is covered
+    flipped: int  # 1 if corners b and c were exchanged to make it counter-clockwise
+    first_u: int  # columns of texels from the first to the last
     last_u: int
-    first_v: int
+    first_v: int  # and rows
     last_v: int
 
 
 @wp.func
 def snap(x: wp.float32) -> wp.int64:
-    """The nearest fixed-point number."""
+    """The nearest fixed-point number to a coordinate in texels."""
     return wp.int64(wp.floor(wp.float64(x) * SUBTEXELS + wp.float64(0.5)))
 
 
 @wp.func
 def unsnap(x: int) -> float:
-    """A fixed-point number in texels."""
-    return float(x) * TEXEL_OF_SUBTEXEL
+    """The coordinate in texels of a fixed-point number."""
+    return float(x) * TEXELS_PER_SUBTEXEL
 
 
 @wp.func
 def first_centre(x: int) -> int:
-    """The first texel whose centre is not below x."""
+    """The first texel whose centre is not below ``x``, in fixed point."""
     return (x + HALF_TEXEL_32 - 1) >> SUBTEXEL_BITS
 
 
 @wp.func
 def last_centre(x: int) -> int:
-    """The last texel whose centre is not above x."""
+    """The last texel whose centre is not above ``x``, in fixed point."""
     return (x - HALF_TEXEL_32) >> SUBTEXEL_BITS
 
 
 @wp.func
 def fixed_triangle(au: int, av: int, bu: int, bv: int, cu: int, cv: int, columns: int, rows: int) -> FixedTriangle:
-    """A projected triangle from snapped corners; ``area`` is 0 where it covers no texel centre for sure."""
+    """A projected triangle from snapped corners a, b, c, on a map of ``columns`` x ``rows`` texels.
+
+    Its ``area`` is 0 if it certainly covers no texel centre.
+    """
     tri = FixedTriangle()
     tri.first_u = wp.max(first_centre(wp.min(au, wp.min(bu, cu))), 0)
     tri.last_u = wp.min(last_centre(wp.max(au, wp.max(bu, cu))), columns - 1)
@@ -95,14 +104,14 @@ def edge(ax: wp.int64, ay: wp.int64, bx: wp.int64, by: wp.int64, x: wp.int64, y:
 
 
 @wp.func
-def owns_its_points(ax: wp.int64, ay: wp.int64, bx: wp.int64, by: wp.int64) -> bool:
-    """Top-left rule: whether points on this edge of a counter-clockwise triangle belong to the triangle."""
+def is_top_left_edge(ax: wp.int64, ay: wp.int64, bx: wp.int64, by: wp.int64) -> bool:
+    """Top-left rule: whether points on the edge from a to b of a counter-clockwise triangle belong to the triangle."""
     return by < ay or (by == ay and bx > ax)
 
 
 @wp.struct
 class Coverage:
-    """Edge functions of a texel centre: weights of a, b, c that add up to the triangle's ``area``."""
+    """Edge functions at a texel centre: weights of the corners a, b, c, which add up to the triangle's ``area``."""
 
     covered: bool
     a: wp.int64
@@ -122,11 +131,11 @@ def cover(tri: FixedTriangle, u: int, v: int) -> Coverage:
     at.c = edge(tri.ax, tri.ay, tri.bx, tri.by, x, y)
     if at.a < zero or at.b < zero or at.c < zero:
         return at
-    if at.a == zero and not owns_its_points(tri.bx, tri.by, tri.cx, tri.cy):
+    if at.a == zero and not is_top_left_edge(tri.bx, tri.by, tri.cx, tri.cy):
         return at
-    if at.b == zero and not owns_its_points(tri.cx, tri.cy, tri.ax, tri.ay):
+    if at.b == zero and not is_top_left_edge(tri.cx, tri.cy, tri.ax, tri.ay):
         return at
-    if at.c == zero and not owns_its_points(tri.ax, tri.ay, tri.bx, tri.by):
+    if at.c == zero and not is_top_left_edge(tri.ax, tri.ay, tri.bx, tri.by):
         return at
     at.covered = True
     return at
@@ -134,7 +143,10 @@ def cover(tri: FixedTriangle, u: int, v: int) -> Coverage:
 
 @wp.func
 def interpolate(tri: FixedTriangle, at: Coverage, a: float, b: float, c: float) -> float:
-    """A corner value, linear over the triangle; never outside the range of the three."""
+    """A value at a texel centre, linear over the triangle, from its values at the corners as they were given.
+
+    The result is never outside the range of the three.
+    """
     wb = wp.where(tri.flipped != 0, at.c, at.b)
     wc = wp.where(tri.flipped != 0, at.b, at.c)
     area = wp.float64(tri.area)

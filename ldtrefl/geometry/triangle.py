@@ -1,17 +1,19 @@
-"""A triangle's barycentrics: the weights of its second and third corner at a point; the first has the rest."""
+"""Barycentrics of a triangle (a, b, c): the weights (u, v) of b and c at a point; a has the rest, 1 - u - v."""
 
 from __future__ import annotations
 
 import warp as wp
 
 ONE_THIRD = wp.constant(1.0 / 3.0)
-"""Barycentrics of a triangle's centre."""
+"""Both barycentrics of a triangle's centroid."""
 
 
 @wp.func
 def plane_coordinates(a: wp.vec3, b: wp.vec3, c: wp.vec3, p: wp.vec3) -> wp.vec3:
-    """Weights of b and c at the point of a triangle's plane next to ``p``, whether inside or not, and the squared sine
-    of the corner at a; all 0 for a triangle without area."""
+    """Where ``p`` projects to in a triangle's plane, inside or outside: (u, v, squared sine of the angle at a).
+
+    All three are 0 for a triangle without area.
+    """
     e, f, g = b - a, c - a, p - a
     ee, ef, ff = wp.dot(e, e), wp.dot(e, f), wp.dot(f, f)
     ge, gf = wp.dot(g, e), wp.dot(g, f)
@@ -22,8 +24,8 @@ def plane_coordinates(a: wp.vec3, b: wp.vec3, c: wp.vec3, p: wp.vec3) -> wp.vec3
 
 
 @wp.func
-def brought_inside(u: float, v: float) -> wp.vec2:
-    """Barycentrics of the triangle's point next to one that lies outside by rounding."""
+def clamped_barycentrics(u: float, v: float) -> wp.vec2:
+    """Barycentrics moved into the triangle, for a point that lies outside by rounding."""
     u_inside, v_inside = wp.clamp(u, 0.0, 1.0), wp.clamp(v, 0.0, 1.0)
     excess = wp.max(u_inside + v_inside, 1.0)
     return wp.vec2(u_inside / excess, v_inside / excess)
@@ -31,6 +33,6 @@ def brought_inside(u: float, v: float) -> wp.vec2:
 
 @wp.func
 def barycentrics_at(a: wp.vec3, b: wp.vec3, c: wp.vec3, p: wp.vec3) -> wp.vec2:
-    """Weights of b and c at the point of the triangle's plane next to ``p``, brought into the triangle."""
+    """Barycentrics (u, v) of where ``p`` projects to in a triangle's plane, moved into the triangle."""
     at = plane_coordinates(a, b, c, p)
-    return brought_inside(at[0], at[1])
+    return clamped_barycentrics(at[0], at[1])

@@ -1,4 +1,4 @@
-"""Vectors of float32 and float64 in kernels: positions are float64 where they must be, directions float32."""
+"""Vectors of float32 and float64 in kernels. Positions that may lie far from 0 are float64, directions are float32."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def as_single(p: wp.vec3d) -> wp.vec3:
 
 @wp.func
 def from_to(a: wp.vec3d, b: wp.vec3d) -> wp.vec3:
-    """The vector from one point to another: subtracted in float64, so that neighbours keep their distance."""
+    """The float32 vector from a to b, subtracted in float64: points far from 0 keep their distance."""
     return wp.vec3(float(b[0] - a[0]), float(b[1] - a[1]), float(b[2] - a[2]))
 
 
@@ -31,7 +31,7 @@ def point_along(origin: wp.vec3d, direction: wp.vec3, t: float) -> wp.vec3d:
 
 @wp.func
 def low_side(a: wp.vec3d, b: wp.vec3d) -> wp.vec3d:
-    """The smaller of each coordinate; of -0 and 0 that of ``b``. Comparisons, where ``wp.min`` calls the C library."""
+    """The smaller of each coordinate; of 0 and -0 that of ``b``. ``wp.min`` would call the C library for each."""
     return wp.vec3d(
         wp.where(a[0] < b[0], a[0], b[0]), wp.where(a[1] < b[1], a[1], b[1]), wp.where(a[2] < b[2], a[2], b[2])
     )
@@ -39,7 +39,7 @@ def low_side(a: wp.vec3d, b: wp.vec3d) -> wp.vec3d:
 
 @wp.func
 def high_side(a: wp.vec3d, b: wp.vec3d) -> wp.vec3d:
-    """The larger of each coordinate; of -0 and 0 that of ``b``."""
+    """The larger of each coordinate; of 0 and -0 that of ``b``."""
     return wp.vec3d(
         wp.where(a[0] > b[0], a[0], b[0]), wp.where(a[1] > b[1], a[1], b[1]), wp.where(a[2] > b[2], a[2], b[2])
     )
