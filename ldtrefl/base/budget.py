@@ -1,45 +1,49 @@
 """How much memory a scene may take: estimated and asked for before anything is allocated.
 
-Small files can ask for much: a picture of one colour, a shape of many segments, an archive. So whoever is about to
-allocate what a file asks for first *takes* that many bytes from the account in use. An account is opened for a scene,
-so that what its files need adds up; outside one, every request stands alone.
+Small files can ask for much: a picture of one colour, a shape of many segments, an archive. So a reader that is about
+to allocate what a file asks for first *takes* that many bytes from the account in use. An account is opened for a
+scene, so that the needs of all its files add up. Outside an account, every request is counted alone.
 
-The promise for files that nobody has looked at (``SECURITY.md`` has the table by kind of file): loading and rendering
-take no more than the limit, and half a gigabyte for the program itself. The limit is 4 GiB; the environment variable
-``LDTREFL_MEMORY``, ``--memory`` and :func:`set_memory_limit` set another. Estimates are peaks that were measured, so
-that what is taken counts what rendering adds to loading.
+The promise for untrusted files (``SECURITY.md`` has the table by kind of file): loading and rendering take no more than
+the limit, and half a gigabyte for the program itself. The limit is 4 GiB; the environment variable ``LDTREFL_MEMORY``,
+``--memory`` and :func:`set_memory_limit` set another. Estimates are peaks that were measured, of loading and rendering
+together.
 """
 
 from __future__ import annotations
 
 import contextlib
 import contextvars
+import operator
 import os
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import SupportsIndex
 
 from ldtrefl.base.errors import InputError
 
 DEFAULT_LIMIT = 4 << 30
 """Bytes: enough for meshes of ten million triangles, and less than most machines have."""
 
-
 VARIABLE = "LDTREFL_MEMORY"
 """Environment variable that holds another limit."""
 
-_UNITS = {"": 1, "K": 1 << 10, "M": 1 << 20, "G": 1 << 30, "T": 1 << 40}
+UNITS = {"": 1, "K": 1 << 10, "M": 1 << 20, "G": 1 << 30, "T": 1 << 40}
+"""Bytes in a unit, by its first letter."""
 
 
 @dataclass
 class _Limit:
+    """The limit that was set by a call."""
+
     value: int | None = None
-    """``None``: the environment's, or else the default."""
+    """Bytes; ``None`` for the environment's limit, or else the default."""
 
 
 @dataclass
 class Account:
-    """What has been taken for one scene."""
+    """The memory that was asked for, for one scene."""
 
     taken: int = 0
     """Bytes."""
@@ -49,24 +53,29 @@ _limit = _Limit()
 _account: contextvars.ContextVar[Account | None] = contextvars.ContextVar("ldtrefl_account", default=None)
 
 
-def set_memory_limit(limit: int | None = None) -> None:
-    """Let a scene take this many bytes from now on; ``None`` means that of ``LDTREFL_MEMORY``, or else 4 GiB.
+def set_memory_limit(limit: SupportsIndex | None = None) -> None:
+    """Let a scene take this many bytes from now on; ``None`` means the limit of ``LDTREFL_MEMORY``, or else 4 GiB.
 
     Raises:
-        InputError: not a whole number of at least 1.
+        InputError: ``limit`` is not a whole number of at least 1.
     """
-    if limit is not None:
-        if isinstance(limit, bool) or not hasattr(limit, "__index__") or limit.__index__() < 1:
-            raise InputError(f"the memory limit must be a whole number of bytes, at least 1, got {limit!r}")
-        limit = limit.__index__()
-    _limit.value = limit
+    if limit is None:
+        _limit.value = None
+        return
+    try:
+        count = operator.index(limit)
+    except TypeError:
+        count = 0
+    if isinstance(limit, bool) or count < 1:
+        raise InputError(f"the memory limit must be a whole number of bytes, at least 1, got {limit!r}")
+    _limit.value = count
 
 
 def memory_limit() -> int:
     """Bytes that a scene may take.
 
     Raises:
-        InputError: ``LDTREFL_MEMORY`` counts and holds no size.
+        InputError: no limit was set by a call, and ``LDTREFL_MEMORY`` holds something that is no size.
     """
     if _limit.value is not None:
         return _limit.value
@@ -85,7 +94,7 @@ def size_of(text: str, place: str) -> int:
         InputError: it is no size of at least one byte.
     """
     number = re.fullmatch(r"\s*(\d{1,18}(?:\.\d{1,9})?)\s*([KMGT]?)(?:i?B)?\s*", text, re.IGNORECASE | re.ASCII)
-    count = int(float(number[1]) * _UNITS[number[2].upper()]) if number else 0
+    count = int(float(number[1]) * UNITS[number[2].upper()]) if number else 0
     if count < 1:
         raise InputError(f"{place}: expected a size such as 8G, 512M or a number of bytes, got '{text[:40]}'")
     return count
@@ -93,7 +102,7 @@ def size_of(text: str, place: str) -> int:
 
 @contextlib.contextmanager
 def account() -> Iterator[Account]:
-    """Add up what is taken inside this block; inside another account, that one goes on."""
+    """Add up all memory that is asked for inside this block. Inside another account's block that account is used."""
     current = _account.get()
     if current is not None:
         yield current

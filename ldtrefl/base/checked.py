@@ -1,8 +1,8 @@
-"""Dataclasses that check themselves: their kinds of values, and what they raise.
+"""Dataclasses that check their values: the types of their fields, and what they raise.
 
-A class is a frozen pydantic dataclass with ``refusing_in_one_line`` above it: wrong values and unknown names then raise
-``InputError`` in Python too, one line that names the class and the key. Kinds take NumPy's scalars and arrays for plain
-numbers and lists, and a single number for a colour.
+A class is a frozen pydantic dataclass with ``refusing_in_one_line`` above it. Wrong values and unknown names then raise
+``InputError`` in Python too, in one line that names the class and the key. The types of fields take NumPy's scalars and
+arrays for plain numbers and lists, and a single number for a grey colour.
 """
 
 from __future__ import annotations
@@ -18,20 +18,24 @@ from ldtrefl.base.errors import InputError, first_fault
 
 CONFIG = ConfigDict(extra="forbid", arbitrary_types_allowed=True, populate_by_name=True)
 """How every class is checked."""
+
 LARGEST = 1e15
 """Largest coordinate: its square and the products of two stay far inside float32's range once scaled."""
+
 SMALLEST = 1.0 / LARGEST
 """Smallest size, for the same reason."""
+
 BRIGHTEST = 1e9
-"""Largest radiance, and albedo: the products of any two, and sums of many lights, stay finite in float32."""
+"""Largest radiance and albedo: the products of any two, and sums of many lights, stay finite in float32."""
 
 
-def plain(value: Any) -> Any:
-    """NumPy's numbers and arrays as Python's."""
+def plain(value: object) -> object:
+    """NumPy's numbers and arrays as Python's; anything else as it is."""
     return value.tolist() if isinstance(value, (np.generic, np.ndarray)) else value
 
 
-def _plain_number(value: Any) -> Any:
+def _plain_number(value: object) -> object:
+    """NumPy's numbers as Python's; a bool is none."""
     value = plain(value)
     if isinstance(value, bool):
         raise ValueError("should be a number")
@@ -39,16 +43,18 @@ def _plain_number(value: Any) -> Any:
 
 
 def _in_range(value: float) -> float:
+    """A size that float32 can hold the square of."""
     if not SMALLEST <= value <= LARGEST:
         raise ValueError(f"should be from {SMALLEST:g} to {LARGEST:g}, got {value:g}")
     return value
 
 
-def _is_number(value: Any) -> bool:
+def _is_number(value: object) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
 def _nonzero(vector: tuple[float, float, float]) -> tuple[float, float, float]:
+    """A vector that has a direction."""
     if max(map(abs, vector)) < SMALLEST:  # the square of what is shorter is no number to divide by
         raise ValueError(f"must not be the zero vector, nor shorter than {SMALLEST:g}")
     return vector
@@ -69,17 +75,18 @@ _Fraction = Annotated[Real, Field(ge=0.0, le=1.0)]
 
 
 def _grey(channel: Any) -> BeforeValidator:
-    """Lets one number stand for three alike; a fault then names no channel."""
+    """Lets one number stand for three equal channels; what is wrong with it is then said without naming a channel."""
     adapter: TypeAdapter[Any] = TypeAdapter(channel)
 
-    def three_of(value: Any) -> Any:
+    def three_of(value: object) -> object:
         value = plain(value)
         return (adapter.validate_python(value),) * 3 if _is_number(value) else value
 
     return BeforeValidator(three_of)
 
 
-def _one_or_three(value: Any) -> Any:
+def _one_or_three(value: object) -> float | tuple[float, float, float]:
+    """A size, or one for each axis."""
     value = plain(value)
     return (_ONE_SIZE if _is_number(value) else _THREE_SIZES).validate_python(value)
 
@@ -87,7 +94,7 @@ def _one_or_three(value: Any) -> Any:
 Color = Annotated[tuple[_Radiance, _Radiance, _Radiance], _grey(_Radiance)]
 Intensity = Annotated[tuple[_Intensity, _Intensity, _Intensity], _grey(_Intensity)]
 Reflectance = Annotated[tuple[_Fraction, _Fraction, _Fraction], _grey(_Fraction)]
-Scale = Annotated[float | tuple[float, float, float], PlainValidator(_one_or_three)]  # a union would name both faults
+Scale = Annotated[float | tuple[float, float, float], PlainValidator(_one_or_three)]  # a union names both faults
 _ONE_SIZE: TypeAdapter[Any] = TypeAdapter(Positive)
 _THREE_SIZES: TypeAdapter[Any] = TypeAdapter(tuple[Positive, Positive, Positive])
 
@@ -95,9 +102,9 @@ Class = TypeVar("Class", bound=type)
 
 
 def refusing_in_one_line(cls: Class) -> Class:
-    """Make a pydantic dataclass raise ``InputError`` when it is built with wrong values or names, however it is built.
+    """Make a pydantic dataclass raise ``InputError`` when it is built in Python with wrong values or names.
 
-    What is built from tables (``load_scene``) does not come through here: there the key's place in the file is named.
+    Objects that ``load_scene`` builds from a file's tables are not built here: those errors name the place in the file.
     """
     inner = vars(cls)["__init__"]
     names = [entry.name for entry in dataclasses.fields(cls)]

@@ -1,4 +1,4 @@
-"""What a user's wrong input raises, always as one line that names the place, the fault and what is allowed."""
+"""The error that a user's wrong input raises: one line that says where, what is wrong, and what is allowed."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 UNKNOWN_KEY = ("extra_forbidden", "unexpected_keyword_argument")
-"""Pydantic's names for a key that a table does not have."""
+"""Pydantic's names for the error that a table has no such key."""
 
 
 class InputError(ValueError):
@@ -21,17 +21,23 @@ class InputError(ValueError):
         super().__init__(printable(" ".join(str(message).split())))
 
     def within(self, place: str) -> InputError:
-        """The same fault, with the file or key that holds it put in front."""
+        """The same error with a place, the file or key that holds it, in front of its message."""
         return InputError(f"{place}: {self}")
 
 
 def printable(text: str) -> str:
-    """``text`` with what a terminal would obey, or could not show, written as escapes: names come from files."""
+    """``text`` with characters that a terminal would obey, or could not show, as escapes. Names may come from files."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
 
 
 def unknown_name(kind: str, name: str, allowed: Iterable[str]) -> InputError:
-    """An ``InputError`` for a name that is not one of ``allowed``, suggesting the nearest."""
+    """An ``InputError`` for a name that is not one of ``allowed``: it suggests the nearest.
+
+    Args:
+        kind: what the name is of, such as "method".
+        name: what the user wrote.
+        allowed: all that may be written.
+    """
     names = sorted(allowed)
     near = difflib.get_close_matches(name, names, n=1)
     hint = f"; did you mean '{near[0]}'?" if near else ""
@@ -41,12 +47,13 @@ def unknown_name(kind: str, name: str, allowed: Iterable[str]) -> InputError:
 def first_fault(
     error: ValidationError, allowed_keys: dict[str, list[str]], names: dict[str, str] | None = None
 ) -> InputError:
-    """The first fault that pydantic found, as one line with its full key.
+    """The first error that pydantic found, as one line with its full key.
 
     Args:
         error: what pydantic raised.
-        allowed_keys: a table's key without indices ('object.material', '' at the top) -> the keys it may hold.
-        names: what a key at the top is called in Python, where that differs from the file.
+        allowed_keys: the key of a table, without indices ("object.material"; "" at the top) -> the keys that it may
+            hold.
+        names: a key at the top of the file -> its name in Python, where that is another.
     """
     faults = error.errors(include_url=False, include_context=True)
     # A misspelt key often shows as a missing one too: the unknown key is the one to name.
@@ -70,6 +77,7 @@ def first_fault(
 
 
 def _key(location: Iterable[int | str]) -> str:
+    """A place in tables and lists as people write it: "object[2].material.albedo"."""
     key = ""
     for part in location:
         key += f"[{part}]" if isinstance(part, int) else f".{part}" if key else part
@@ -77,6 +85,7 @@ def _key(location: Iterable[int | str]) -> str:
 
 
 def _shortened(value: object, limit: int = 60) -> str:
+    """A value as Python writes it, of at most ``limit`` characters."""
     try:
         text = repr(value)
     except (ValueError, RecursionError):  # a whole number of thousands of digits, lists in lists in lists

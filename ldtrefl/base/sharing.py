@@ -1,7 +1,7 @@
-"""Results that are shared while somebody holds them, and held by nobody else.
+"""Functions that return the same object to equal calls for as long as somebody holds it.
 
-A mesh of ten million triangles takes hundreds of megabytes. A cache that keeps it alive for a later call keeps it after
-the scene is gone, outside every budget. So what is made once for equal calls is held weakly: all who use it hold it.
+A mesh of ten million triangles takes hundreds of megabytes. An ordinary cache would keep it for a later call after the
+scene is gone, and no memory budget would count it. So results are held weakly here: those who use them keep them.
 """
 
 from __future__ import annotations
@@ -16,8 +16,10 @@ Made = TypeVar("Made")
 
 
 def shared_while_used(make: Callable[..., Made]) -> Callable[..., Made]:
-    """Make equal calls of ``make`` return one object for as long as it is used, whichever threads call. Arguments must
-    be hashable."""
+    """Make equal calls of ``make`` return one object for as long as anybody holds it, whichever threads call.
+
+    Arguments are positional and hashable, results can be referred to weakly.
+    """
     made: weakref.WeakValueDictionary[Hashable, Any] = weakref.WeakValueDictionary()
     lock = threading.RLock()
 

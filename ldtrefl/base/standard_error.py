@@ -1,4 +1,4 @@
-"""Standard error: what native libraries print there behind Python's back, and the lines that the package logs."""
+"""Standard error: what native libraries print there past Python is filtered, and what the package logs is printed."""
 
 from __future__ import annotations
 
@@ -18,22 +18,25 @@ CHATTER = re.compile(
     b"|Warp CUDA warning: Could not find or load the NVIDIA CUDA driver"  # no news on a machine without a GPU
     b")[^\n]*\n?"
 )
-"""What native libraries print and nobody needs to see: to the end of its line, as another thread's line may have been
-begun before it."""
+"""What native libraries print and nobody needs to see, up to the end of the line. It need not be at the line's
+beginning: another thread may have begun that."""
 
 STDERR = 2
+"""The file descriptor of standard error."""
 
 
 class _Catching:
-    """File descriptor 2 is the whole process's: however many threads catch, it is put aside once."""
+    """Standard error put aside in a file. The descriptor is the whole process's: it is put aside once, however many
+    threads are inside a block."""
 
     def __init__(self) -> None:
         self.lock = threading.Lock()
         self.blocks = 0  # threads' blocks that are open
-        self.kept = -1  # a duplicate of what descriptor 2 was; -1 if nothing is caught
-        self.said = -1  # the file that it is meanwhile
+        self.usual = -1  # a duplicate of the usual descriptor; -1 if nothing is caught
+        self.caught = -1  # of the file that stands in for it meanwhile
 
     def begin(self) -> None:
+        """Enter a block; the first one puts standard error aside."""
         self.blocks += 1
         if self.blocks > 1:
             return
@@ -47,19 +50,20 @@ class _Catching:
             for descriptor in opened:
                 os.close(descriptor)
             return
-        self.kept, self.said = opened
+        self.usual, self.caught = opened
 
     def end(self) -> None:
+        """Leave a block; the last one puts standard error back and prints what others than libraries wrote."""
         self.blocks -= 1
-        if self.blocks or self.kept < 0:
+        if self.blocks or self.usual < 0:
             return
-        os.dup2(self.kept, STDERR)
-        size = os.lseek(self.said, 0, os.SEEK_END)
-        os.lseek(self.said, 0, os.SEEK_SET)
-        with open(self.said, "rb") as said:
-            caught = said.read(size)
-        os.close(self.kept)
-        self.kept = self.said = -1
+        os.dup2(self.usual, STDERR)
+        size = os.lseek(self.caught, 0, os.SEEK_END)
+        os.lseek(self.caught, 0, os.SEEK_SET)
+        with open(self.caught, "rb") as file:
+            caught = file.read(size)
+        os.close(self.usual)
+        self.usual = self.caught = -1
         # What else was printed meanwhile, by other threads, belongs where it was meant to go.
         rest = CHATTER.sub(b"", caught)
         with suppress(OSError):
@@ -67,17 +71,17 @@ class _Catching:
                 rest = rest[os.write(STDERR, rest) :]
 
     def after_fork_in_child(self) -> None:
-        """The threads that were in a block do not exist here, and the parent prints what they caught."""
-        if self.kept >= 0:
-            os.dup2(self.kept, STDERR)
-            os.close(self.kept)
-            os.close(self.said)
-        self.blocks, self.kept, self.said = 0, -1, -1
+        """Forget all blocks: their threads do not exist here, and the parent prints what was caught."""
+        if self.usual >= 0:
+            os.dup2(self.usual, STDERR)
+            os.close(self.usual)
+            os.close(self.caught)
+        self.blocks, self.usual, self.caught = 0, -1, -1
         self.lock.release()
 
 
 _catching = _Catching()
-# No thread is half way through a swap while another forks.
+# No thread is in the middle of begin or end while another forks.
 os.register_at_fork(
     before=_catching.lock.acquire,
     after_in_parent=_catching.lock.release,
@@ -103,6 +107,7 @@ def caught_stderr() -> Iterator[None]:
 
 
 def _scratch_file() -> int:
+    """The descriptor of a new file without a name."""
     if hasattr(os, "memfd_create"):
         return os.memfd_create("ldtrefl-stderr")
     with tempfile.TemporaryFile() as file:
@@ -110,7 +115,7 @@ def _scratch_file() -> int:
 
 
 class _StderrHandler(logging.Handler):
-    """Writes to what standard error is now, so that a progress bar that has taken it over stays whole."""
+    """Writes to what ``sys.stderr`` is at that moment, so that a progress bar that has taken it over stays whole."""
 
     def emit(self, record: logging.LogRecord) -> None:
         with suppress(AttributeError, OSError, ValueError):

@@ -1,16 +1,17 @@
-"""Sorting items into bins by number, and listing some of many items.
+"""Counting sort of items into bins, and listing the few of many items that a kernel selects (stream compaction).
 
-*Bins*: count and rank, prefix sum; item i then goes to ``start[number[i]] + rank[i]``. Stable and the same for any
-number of threads: the CPU counts the items in order on one. On CUDA the order within a bin is left to chance.
+*Bins*: items are counted and ranked, and the counts are summed up. Item i then belongs in place
+``start[number[i]] + rank[i]``. The order is stable and the same for any number of threads, as the CPU counts the items
+one after another on one thread. On CUDA the order within a bin is left to chance.
 
-*Chunks*: a kernel that keeps few of its items goes through them in chunks, each of which lists what it keeps where the
-chunk's own items stand; the lists are then joined. Only the chunks' counts are summed, not a mark for every item.
+*Chunks*: a kernel that selects few of its items goes through them in chunks of ``CHUNK``. Each chunk lists the items
+that it selects at the place of its own first item, and counts them. The lists are then joined. So only the chunks'
+counts are summed up, and not a mark for every item.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import warp as wp
 
@@ -29,6 +30,7 @@ def count_items(
     counts_out: wp.array(dtype=wp.int32),
     ranks_out: wp.array(dtype=wp.int32),  # in their bins
 ):
+    """Each thread counts one item in its bin. Launched in order on the CPU."""
     i = first + wp.tid()
     ranks_out[i] = wp.atomic_add(counts_out, numbers[i], 1)
 
@@ -42,23 +44,24 @@ def copy_lists(
     # Out:
     list_out: wp.array(dtype=wp.int32),
 ):
+    """Each thread copies the list of one chunk to its place among all."""
     chunk = first + wp.tid()
     for k in range(places[chunk + 1] - places[chunk]):
         list_out[places[chunk] + k] = lists[CHUNK * chunk + k]
 
 
 def chunk_count(items: int) -> int:
-    """Chunks that hold so many items."""
+    """The number of chunks that ``items`` items make."""
     return -(-items // int(CHUNK))
 
 
-def launch_chunks(kernel: wp.Kernel, items: int, arguments: Sequence[Any], device: wp.Device) -> None:
-    """Run a kernel over the chunks of ``items``."""
+def launch_chunks(kernel: wp.Kernel, items: int, arguments: Sequence[object], device: wp.Device) -> None:
+    """Run ``kernel(first, *arguments)`` for the chunks of ``items`` items: its items are chunks."""
     launch.launch(kernel, chunk_count(items), arguments, device)
 
 
 def exclusive_scan(counts: wp.array) -> tuple[wp.array, int]:
-    """(prefix sums, their last): ``counts`` ends with a 0 that the total takes the place of."""
+    """(for each count the sum of those before it, total). The last count is 0; the total stands in its place."""
     sums = wp.empty_like(counts)
     wp.utils.array_scan(counts, sums, inclusive=False)
     # On the CPU the array is read where it lies; from CUDA only its last number comes.
@@ -67,7 +70,12 @@ def exclusive_scan(counts: wp.array) -> tuple[wp.array, int]:
 
 
 def bin_items(numbers: wp.array, bins: int, device: wp.Device) -> tuple[wp.array, wp.array]:
-    """Sort items by bin.
+    """Find the places of items sorted by bin.
+
+    Args:
+        numbers: (items,) int32, the bin of each item.
+        bins: how many bins there are.
+        device: where ``numbers`` is.
 
     Returns:
         start: (bins + 1,) int32, first place of each bin.
@@ -82,7 +90,7 @@ def bin_items(numbers: wp.array, bins: int, device: wp.Device) -> tuple[wp.array
 
 
 def gather_lists(lists: wp.array, counts: wp.array) -> wp.array:
-    """One list of what each chunk listed, in order.
+    """Join the lists of all chunks in order: (selected items,) int32.
 
     Args:
         lists: (items,) int32; a chunk's list starts at its first item.

@@ -12,9 +12,9 @@ import functools
 import operator
 import os
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, SupportsIndex
+from typing import SupportsIndex, TypeVar, cast
 
 import warp as wp
 
@@ -26,15 +26,18 @@ from ldtrefl.device.recorded_launch import on_this_thread, record_launch
 from ldtrefl.device.thread_self_test import why_not_native
 
 REPORTS = 32
-"""Times that a launch reports how far it is, if anyone wants to know."""
+"""Times that a launch reports how far it is, if anyone watches (``progress.py``)."""
 
 KERNELS: list[wp.Kernel] = []
 """Every kernel defined so far. Each is a module of its own: it is compiled when it is first needed, and no sooner."""
 
 MOST_ITEMS = 2**31 - 1
-"""Items of a launch: their numbers are int32."""
+"""Items of a launch at most: their numbers are int32."""
 
 MOST_THREADS = 1024
+"""CPU threads that may be asked for."""
+
+Make = TypeVar("Make", bound=Callable[..., object])
 
 
 @dataclass
@@ -67,23 +70,23 @@ def kernel(function: Callable[..., None]) -> wp.Kernel:
     return made
 
 
-def once(make: Callable[..., Any]) -> Callable[..., Any]:
-    """A function that makes kernels, or what they are made of: for equal arguments once, whichever thread asks first.
+def once(make: Make) -> Make:
+    """A function that makes kernels, or what they are made of: once for equal arguments, whichever thread asks first.
 
     Two kernels of one name would share a module of Warp's, and the second would have the first's code unloaded.
     """
     cached = functools.cache(make)
 
     @functools.wraps(make)
-    def made(*arguments: Any) -> Any:
+    def made(*arguments: Hashable) -> object:
         with _state.defining:
             return cached(*arguments)
 
-    return made
+    return cast("Make", made)
 
 
 def set_threads(threads: SupportsIndex | None = None) -> None:
-    """Use this many CPU threads from now on; ``None`` means all cores.
+    """Use this many CPU threads for the launches from now on; ``None`` means one for each core.
 
     Raises:
         InputError: ``threads`` is not a whole number from 1 to 1024.
@@ -103,7 +106,7 @@ def thread_count() -> int:
 
 
 def threading_note() -> str | None:
-    """A line if threads share launches in a slower way, because this version of Warp is not known well enough."""
+    """A line for the user if threads share launches in the slower way, as this Warp is not known; else None."""
     resolve_device(None)
     reason = why_not_native()
     if reason is None:
@@ -127,7 +130,7 @@ def resolve_device(name: str | None) -> wp.Device:
         raise InputError(f"no device '{name}' (here: {known})") from error
 
 
-def launch(kernel: wp.Kernel, count: int, arguments: Sequence[Any], device: wp.Device) -> None:
+def launch(kernel: wp.Kernel, count: int, arguments: Sequence[object], device: wp.Device) -> None:
     """Run ``kernel(first, *arguments)`` for ``count`` items, on the CPU in slices over the threads.
 
     Raises:
@@ -152,7 +155,7 @@ def launch(kernel: wp.Kernel, count: int, arguments: Sequence[Any], device: wp.D
         progress.report(end / count)
 
 
-def launch_in_order(kernel: wp.Kernel, count: int, arguments: Sequence[Any], device: wp.Device) -> None:
+def launch_in_order(kernel: wp.Kernel, count: int, arguments: Sequence[object], device: wp.Device) -> None:
     """Run ``kernel(first, *arguments)`` for ``count`` items, on the CPU one after another on one thread.
 
     For kernels whose items share memory. CUDA runs them at once, so such kernels use atomics all the same (Warp's
@@ -165,6 +168,7 @@ def launch_in_order(kernel: wp.Kernel, count: int, arguments: Sequence[Any], dev
 
 
 def _check_count(count: int) -> None:
+    """Refuse a launch of more items than can be numbered, in an ``InputError``."""
     if count > MOST_ITEMS:
         raise InputError(
             f"{count} items at once, at most {MOST_ITEMS} can be numbered: take a smaller scene or resolution"

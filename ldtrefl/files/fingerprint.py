@@ -1,9 +1,10 @@
-"""What an algorithm is, in one number: a hash of the source that it is written in, and of its constants.
+"""The version of an algorithm in one number: a hash of the source that it is written in, and of its constants.
 
-What is kept on disk is made by an algorithm, and is worth nothing to another. So a name under which it is kept holds a
-fingerprint of the module that made it and of everything of this package that the module imports, by name and however
-far down: no list has to be kept up, and a new constant, record or module is part of it by itself. The source is hashed
-as it stands in the files, C++ included, and the constants (names in capitals) as they are now, changed or not.
+What one version of an algorithm keeps on disk is of no use to another version. So the key under which it is kept holds
+a fingerprint of the module that made it, and of every module of this package that it imports, however far down. No list
+has to be kept up: a new constant, struct or module is part of the fingerprint by itself. The source is hashed as it
+stands in the files, C++ included. Constants (names in capitals) are hashed with the values that they have now, which
+may have been changed since the module was loaded.
 """
 
 from __future__ import annotations
@@ -19,13 +20,14 @@ import xxhash
 PACKAGE = __name__.partition(".")[0]
 FOLDER = Path(__file__).parent.parent
 IMPORTED = re.compile(rf"^[ \t]*from {PACKAGE}(?:\.([\w.]+))? import (\([^)]*\)|.*)", re.MULTILINE)
-"""A line that imports something of the package: ``from package.a.b import c, d``, in brackets over several lines."""
+"""A line that imports from the package: ``from package.a.b import c, d``, or with brackets over several lines."""
+
 NATIVE = re.compile(r'"([\w/]+\.h)"')
-"""The name of a file of C++."""
+"""The name of a file of C++ in a module's source, as ``native_sources.native_body`` takes it."""
 
 
 def fingerprint(module: str) -> str:
-    """A hash of a module of the package, such as "ldt", of all that it imports, and of their constants as they are."""
+    """A hash of a module of the package, such as "ldt.texture", of all that it imports, and of their constants now."""
     names, digest = _sources(module)
     constants = {name: _constants(name) for name in names}
     return str(xxhash.xxh3_128_hexdigest(json.dumps([digest, constants], sort_keys=True).encode()))
@@ -33,7 +35,7 @@ def fingerprint(module: str) -> str:
 
 @functools.cache
 def _sources(module: str) -> tuple[tuple[str, ...], str]:
-    """(names of the modules, hash of their files), those that ``module`` imports included."""
+    """(names, hash of the files) of ``module`` and of all modules of the package that it imports."""
     found: dict[str, bytes] = {}
     wanted = [module]
     while wanted:
@@ -53,7 +55,7 @@ def _sources(module: str) -> tuple[tuple[str, ...], str]:
 
 
 def _imported(source: str) -> list[str]:
-    """Names that may be modules of the package, of all that a file imports wherever in it."""
+    """Names that a file imports from the package, wherever in the file. Some are modules, others stand in a module."""
     names = []
     for room, listed in IMPORTED.findall(source):
         names += [room, *(f"{room}.{name}".strip(".") for name in re.findall(r"\w+", listed))]
@@ -61,7 +63,7 @@ def _imported(source: str) -> list[str]:
 
 
 def _constants(name: str) -> dict[str, str]:
-    """Name -> value of a module's constants: what is written in capitals and made of plain values."""
+    """Name -> value, as JSON, of a loaded module's constants: names in capitals whose values JSON can hold."""
     plain = {}
     for constant, value in vars(sys.modules.get(f"{PACKAGE}.{name}", object)).items():
         if constant.isupper():

@@ -21,7 +21,7 @@ import mmap
 import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TypeVar, overload
+from typing import TypeVar
 
 import numpy as np
 import platformdirs
@@ -73,14 +73,12 @@ class MapCache:
         """Where the file of this name is, or would be."""
         return self.folder / f"{key}{SUFFIX}"
 
-    @overload
-    def load(self, key: str) -> Entry | None: ...
+    def load(self, key: str) -> Entry | None:
+        """The entry of this name; None if there is none, or its file is damaged, with a line of warning."""
+        return self.load_as(key, lambda entry: entry)
 
-    @overload
-    def load(self, key: str, read: Callable[[Entry], Made]) -> Made | None: ...
-
-    def load(self, key: str, read: Callable[[Entry], object] = lambda entry: entry) -> object:
-        """What is kept under this name, as ``read`` makes it of the entry; None if nothing is, or it is not sound.
+    def load_as(self, key: str, read: Callable[[Entry], Made]) -> Made | None:
+        """What ``read`` makes of the entry of this name; None if there is none, or it is not sound, with a warning.
 
         ``read`` raises an exception, of any kind, where an entry is not sound.
         """

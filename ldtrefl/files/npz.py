@@ -1,27 +1,32 @@
-"""NumPy's ``.npz`` archives from anybody: read only as far as they hold what is expected, within the memory allowed."""
+"""NumPy's ``.npz`` archives from anybody: only the expected arrays are read, within the memory allowed."""
 
 from __future__ import annotations
 
 import os
 import zipfile
+from collections.abc import Mapping
 from pathlib import Path
-from typing import IO, Any
+from typing import IO
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from ldtrefl.base import budget
 from ldtrefl.base.errors import InputError
 from ldtrefl.files.trusted_files import open_plain
 
-Expected = dict[str, tuple[Any, tuple[int | None, ...]]]
-"""Name of an array -> its type and shape, None where any number will do."""
+Kind = tuple[DTypeLike, tuple[int | None, ...]]
+"""Type and shape of an array, None where any length will do."""
+
+Expected = Mapping[str, Kind]
+"""Name of an array -> its type and shape."""
 
 
 def read_arrays(path: str | Path, expected: Expected) -> dict[str, np.ndarray]:
-    """The arrays of an archive by name, those expected and no others.
+    """The expected arrays of an archive, by name. Whatever else it holds is not read.
 
-    An archive may be small and unpack to more than any machine has. So the header of each array is read first, and
-    what they need together is asked for (``budget.py``) before it is allocated.
+    A small archive may unpack to more memory than any machine has. So the header of each array is read first, and the
+    memory for all of them is asked for (``budget.py``) before anything is allocated.
 
     Raises:
         InputError: the file is missing, damaged, holds something else, or needs more memory than is allowed.
@@ -38,8 +43,8 @@ def read_arrays(path: str | Path, expected: Expected) -> dict[str, np.ndarray]:
         raise InputError(words) from error
 
 
-def _checked_bytes(archive: zipfile.ZipFile, name: str, kind: tuple[Any, tuple[int | None, ...]]) -> int:
-    """Bytes of an array, by its header.
+def _checked_bytes(archive: zipfile.ZipFile, name: str, kind: Kind) -> int:
+    """Bytes of an array, as its header says.
 
     Raises:
         ValueError, KeyError: it is missing, of another type or shape, or not as long as its header says.
@@ -61,6 +66,7 @@ def _checked_bytes(archive: zipfile.ZipFile, name: str, kind: tuple[Any, tuple[i
 
 
 def _header(file: IO[bytes]) -> tuple[tuple[int, ...], np.dtype]:
+    """(shape, type) of an array by its header; the file then stands behind that."""
     version = np.lib.format.read_magic(file)
     reader = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}[version]
     shape, _, dtype = reader(file)
@@ -68,5 +74,6 @@ def _header(file: IO[bytes]) -> tuple[tuple[int, ...], np.dtype]:
 
 
 def _read(archive: zipfile.ZipFile, name: str) -> np.ndarray:
+    """Unpack an array."""
     with archive.open(f"{name}.npy") as file:
         return np.asarray(np.lib.format.read_array(file, allow_pickle=False))

@@ -16,7 +16,7 @@ SUBTEXEL_BITS = wp.constant(16)
 them coordinates up to 4096 texels fit in int32, and their edge functions in int64."""
 SUBTEXELS = wp.constant(wp.float64(1 << SUBTEXEL_BITS))
 """Fixed-point steps in a texel."""
-TEXELS_PER_SUBTEXEL = wp.constant(0.5**SUBTEXEL_BITS)
+TEXEL_OF_SUBTEXEL = wp.constant(0.5**SUBTEXEL_BITS)
 """A fixed-point step in texels."""
 TEXEL = wp.constant(wp.int64(1 << SUBTEXEL_BITS))
 """A texel in fixed point."""
@@ -52,7 +52,7 @@ def snap(x: wp.float32) -> wp.int64:
 @wp.func
 def unsnap(x: int) -> float:
     """The coordinate in texels of a fixed-point number."""
-    return float(x) * TEXELS_PER_SUBTEXEL
+    return float(x) * TEXEL_OF_SUBTEXEL
 
 
 @wp.func

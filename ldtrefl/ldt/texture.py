@@ -167,7 +167,7 @@ class LayeredDepthTexture:
             return make()
         options = {"kind": kind, "resolution": self.resolution, "quality": self.quality, "trusted": self.trusted}
         key = key_of(mesh.surface_key, {**options, "algorithm": fingerprint("ldt.texture")})
-        kept = cache.load(key, read)
+        kept = cache.load_as(key, read)
         self.from_cache = kept is not None
         if kept is not None:
             return kept

@@ -12,6 +12,7 @@ from ldtrefl.device import launch
 
 @launch.kernel
 def add_number(first: int, numbers: wp.array(dtype=int)):
+    """Each thread adds its item's number, from 1, to its item."""
     i = first + wp.tid()
     numbers[i] += i + 1
 

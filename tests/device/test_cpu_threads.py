@@ -26,6 +26,7 @@ class Large:
 
 @launch.kernel
 def add_large(first: int, large: Large, numbers: wp.array(dtype=wp.float64)):
+    """Each thread adds a member of the last vector to its item."""
     i = first + wp.tid()
     numbers[i] += large.c[i % 256]
 

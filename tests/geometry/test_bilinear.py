@@ -21,6 +21,7 @@ def look_up(
     colors_out: wp.array(dtype=wp.vec3),
     columns_out: wp.array(dtype=Neighbours),
 ):
+    """Each thread looks up one point of a picture."""
     i = first + wp.tid()
     height, width = picture.shape[0], picture.shape[1]
     x, y = points[i][0], points[i][1]

@@ -21,6 +21,7 @@ def find_spans(
     # Out:
     spans_out: wp.array(dtype=wp.vec2),
 ):
+    """Each thread finds where one ray enters and leaves the box."""
     i = first + wp.tid()
     spans_out[i] = box_span(low, high, origins[i], directions[i])
 
@@ -34,6 +35,7 @@ def list_cells(
     count_out: wp.array(dtype=int),
     cells_out: wp.array(dtype=wp.vec3i),
 ):
+    """One thread lists the cells of the box."""
     count_out[first + wp.tid()] = cell_count(box)
     for k in range(cell_count(box)):
         cells_out[k] = cell_of_box(box, k)
@@ -48,6 +50,7 @@ def find_boxes_about(
     # Out:
     boxes_out: wp.array(dtype=CellBox),
 ):
+    """Each thread finds the box of cells about one cell."""
     i = first + wp.tid()
     boxes_out[i] = cells_about(cells[i], grid)
 

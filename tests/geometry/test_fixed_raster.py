@@ -31,6 +31,7 @@ def draw_triangles(
     counts_out: wp.array2d(dtype=int),
     values_out: wp.array2d(dtype=float),
 ):
+    """Each thread draws one triangle. Launched in order: they write the same texels."""
     i = first + wp.tid()
     a, b, c = corners[i, 0], corners[i, 1], corners[i, 2]
     tri = fixed_triangle(
@@ -56,6 +57,7 @@ def convert_coordinates(
     first_out: wp.array(dtype=int),
     last_out: wp.array(dtype=int),
 ):
+    """Each thread converts one coordinate."""
     i = first + wp.tid()
     snapped_out[i] = int(snap(x[i]))
     back_out[i] = unsnap(snapped_out[i])

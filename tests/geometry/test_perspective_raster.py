@@ -29,6 +29,7 @@ def draw_both_ways(
     homogeneous_out: wp.array2d(dtype=float),
     planar_out: wp.array2d(dtype=float),
 ):
+    """Each thread tests one pixel in both ways."""
     i = first + wp.tid()
     row, column = i / WIDTH, i % WIDTH
     x, y = wp.float64(column) + wp.float64(0.5), wp.float64(row) + wp.float64(0.5)
@@ -52,6 +53,7 @@ def find_extremes(
     low_out: wp.array(dtype=wp.float64),
     high_out: wp.array(dtype=wp.float64),
 ):
+    """Each thread finds the extremes of three numbers."""
     i = first + wp.tid()
     low_out[i] = lowest(numbers[i][0], numbers[i][1], numbers[i][2])
     high_out[i] = highest(numbers[i][0], numbers[i][1], numbers[i][2])

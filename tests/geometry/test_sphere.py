@@ -22,6 +22,7 @@ def meet(
     t_out: wp.array(dtype=float),
     meets_out: wp.array(dtype=bool),
 ):
+    """Each thread tests one ray."""
     i = first + wp.tid()
     t_out[i] = sphere_entry(origins[i], directions[i], centre, radius)
     meets_out[i] = meets_sphere(origins[i], directions[i], centre, radius)

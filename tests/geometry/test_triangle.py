@@ -22,6 +22,7 @@ def locate(
     plane_out: wp.array(dtype=wp.vec3),
     inside_out: wp.array(dtype=wp.vec2),
 ):
+    """Each thread locates one point."""
     i = first + wp.tid()
     plane_out[i] = plane_coordinates(a, b, c, points[i])
     inside_out[i] = barycentrics_at(a, b, c, points[i])
@@ -29,6 +30,7 @@ def locate(
 
 @launch.kernel
 def clamp_all(first: int, uv: wp.array(dtype=wp.vec2), clamped_out: wp.array(dtype=wp.vec2)):
+    """Each thread moves one pair of barycentrics."""
     i = first + wp.tid()
     clamped_out[i] = clamped_barycentrics(uv[i][0], uv[i][1])
 

@@ -24,6 +24,7 @@ def convert(
     low_out: wp.array(dtype=wp.vec3d),
     high_out: wp.array(dtype=wp.vec3d),
 ):
+    """Each thread converts one pair of points."""
     i = first + wp.tid()
     a, b = points[i], others[i]
     single_out[i] = as_single(a)

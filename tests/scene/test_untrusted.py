@@ -9,13 +9,11 @@ import weakref
 from collections.abc import Iterator
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import ldtrefl
 from ldtrefl import InputError
 from ldtrefl.base import budget
-from ldtrefl.base.sharing import shared_while_used
 from ldtrefl.scene import shapes
 from ldtrefl.scene.toml_text import MAX_BRACKETS, MAX_BYTES, MAX_DOTS, MAX_WORD, parse_toml, read_toml
 from tests.conftest import SMALL_SCENE
@@ -175,55 +173,10 @@ def test_a_scene_adds_up_and_counts_what_is_shared_once(tmp_path: Path) -> None:
         ldtrefl.load_scene(path)
 
 
-def test_what_is_shared_goes_when_nobody_uses_it() -> None:
-    calls = []
-
-    @shared_while_used
-    def make(number: int) -> np.ndarray:
-        calls.append(number)
-        return np.zeros(number)
-
-    kept = make(3)
-    assert make(3) is kept and calls == [3]
-    del kept
-    gc.collect()
-    make(3)
-    assert calls == [3, 3]
+def test_a_shape_goes_when_nobody_uses_it() -> None:
     mesh = weakref.ref(shapes.make("torus_knot", {"segments": [50, 7]}))
     gc.collect()
     assert mesh() is None
-
-
-@pytest.mark.parametrize(
-    ("text", "count"),
-    [
-        ("8G", 8 << 30),
-        ("512M", 512 << 20),
-        ("1.5 GiB", 3 << 29),
-        ("7kb", 7 << 10),
-        ("1000000", 10**6),
-        (" 2t ", 2 << 40),
-    ],
-)
-def test_sizes_as_people_write_them(text: str, count: int) -> None:
-    assert budget.size_of(text, "--memory") == count
-
-
-@pytest.mark.parametrize("text", ["", "0", "-1G", "8X", "G", "nan", "1e9", "9" * 400, "1" * 4400, "\uff18G", "0.1"])
-def test_what_is_no_size(text: str) -> None:
-    with pytest.raises(InputError, match="--memory: expected a size such as 8G"):
-        budget.size_of(text, "--memory")
-
-
-def test_the_environment_sets_the_limit_and_the_caller_wins(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(budget.VARIABLE, "1M")
-    assert budget.memory_limit() == 1 << 20
-    budget.set_memory_limit(5)
-    assert budget.memory_limit() == 5
-    budget.set_memory_limit(None)
-    monkeypatch.setenv(budget.VARIABLE, "plenty")
-    with pytest.raises(InputError, match="LDTREFL_MEMORY: expected a size"):
-        shapes.make("box")
 
 
 def test_memory_on_the_command_line(tmp_path: Path) -> None:
