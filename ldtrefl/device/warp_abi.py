@@ -13,7 +13,7 @@ import ctypes
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, cast
 
 import warp as wp
 
@@ -123,26 +123,15 @@ def forget_failure(kernel: wp.Kernel) -> None:
     wp.set_module_options({}, module=kernel.module)
 
 
-class StructType(Protocol):
-    """A class made by ``wp.struct``."""
+def array_of_structs(structs: Sequence[object], dtype: type, device: wp.Device) -> wp.array:
+    """Values of a ``wp.struct`` class as an array that kernels read.
 
-    def numpy_dtype(self) -> dict[str, Any]:
-        """Names, types and offsets of its members."""
-
-
-class StructValue(Protocol):
-    """A value of such a class."""
-
-    def __ctype__(self) -> ctypes.Structure:
-        """Its bytes as kernels read them."""
-
-
-def array_of_structs(structs: Sequence[StructValue], dtype: StructType, device: wp.Device) -> wp.array:
-    """Structs as an array that kernels read, copied bit by bit: ``wp.array`` takes five times as long, as it finds out
-    what a struct is made of. Whoever keeps the array must keep the structs, too: they own what it points to."""
+    They are copied bit by bit. ``wp.array`` takes five times as long, as it finds out what a struct is made of. Whoever
+    keeps the array must keep the structs, too: they own the memory that it points to.
+    """
     try:
-        contents = [bytes(one.__ctype__()) for one in structs]
-        size = int(dtype.numpy_dtype()["itemsize"])
+        contents = [bytes(one.__ctype__()) for one in cast("Sequence[_StructValue]", structs)]
+        size = int(cast("_StructType", dtype).numpy_dtype()["itemsize"])
     except (AttributeError, KeyError, TypeError):
         return wp.array(list(structs), dtype=dtype, device=device)
     if any(len(one) != size for one in contents):
@@ -151,6 +140,18 @@ def array_of_structs(structs: Sequence[StructValue], dtype: StructType, device: 
     if contents:
         ctypes.memmove(made.ptr, b"".join(contents), size * len(contents))
     return made.to(device)
+
+
+class _StructType(Protocol):
+    """A class made by ``wp.struct``."""
+
+    def numpy_dtype(self) -> dict[str, Any]: ...
+
+
+class _StructValue(Protocol):
+    """A value of such a class."""
+
+    def __ctype__(self) -> ctypes.Structure: ...
 
 
 def array_bytes(array: wp.array) -> int:

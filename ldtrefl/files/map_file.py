@@ -12,7 +12,6 @@ import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import xxhash
@@ -32,7 +31,7 @@ class Entry:
 
     arrays: dict[str, np.ndarray]
     """Read-only, in the memory that was read from."""
-    values: dict[str, Any]
+    values: dict[str, object]
     """What JSON can hold."""
 
 

@@ -3,7 +3,6 @@
 import numpy as np
 
 from ldtrefl.files.content_key import content_key
-from ldtrefl.files.stored_picture import StoredPicture
 
 
 def test_type_shape_and_every_value_count() -> None:
@@ -17,13 +16,3 @@ def test_several_contents_are_told_apart() -> None:
     a = np.arange(3)
     contents = [(), (a,), (a, a), (a, None), (None, a), ("a",), ("a", "b"), ("b", "a"), ("ab",), ("", "ab"), ("none ",)]
     assert len({content_key(*entry) for entry in contents}) == len(contents)
-
-
-def test_a_picture_is_known_by_its_pixels() -> None:
-    pixels = np.random.default_rng(0).integers(0, 256, (4, 6, 3), dtype=np.uint8)
-    changed = pixels.copy()
-    changed[3, 5, 2] ^= 1
-    first, second = StoredPicture(pixels), StoredPicture(pixels.copy())
-    assert first.key == second.key != StoredPicture(changed).key
-    assert first.key != StoredPicture(pixels.reshape(6, 4, 3)).key
-    assert not pixels.flags.writeable
