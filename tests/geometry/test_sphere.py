@@ -14,9 +14,9 @@ CENTRE, RADIUS = np.array([1.0, -2.0, 0.5]), 1.5
 def meet(
     first: int,
     # In:
-    origins: wp.array(dtype=wp.vec3),
+    origins: wp.array(dtype=wp.vec3d),
     directions: wp.array(dtype=wp.vec3),
-    centre: wp.vec3,
+    centre: wp.vec3d,
     radius: float,
     # Out:
     t_out: wp.array(dtype=float),
@@ -31,9 +31,9 @@ def meet(
 def met(origins: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(t of entry, whether the sphere is met) of rays."""
     device = launch.resolve_device(None)
-    given = [wp.array(rays, dtype=wp.vec3, device=device) for rays in (origins, directions)]
+    given = [wp.array(origins, dtype=wp.vec3d, device=device), wp.array(directions, dtype=wp.vec3, device=device)]
     t, meets = wp.zeros(len(origins), dtype=float, device=device), wp.zeros(len(origins), dtype=bool, device=device)
-    launch.launch(meet, len(origins), [*given, wp.vec3(*CENTRE), RADIUS, t, meets], device)
+    launch.launch(meet, len(origins), [*given, wp.vec3d(*CENTRE), RADIUS, t, meets], device)
     return t.numpy(), meets.numpy()
 
 
