@@ -105,54 +105,6 @@ def test_set_on_the_command_line_has_the_same_limits() -> None:
             _options([f"a={value}"])
 
 
-TOO_LARGE = [
-    ("torus_knot", {"segments": [8192, 8192]}, r"params\.segments"),
-    ("sphere", {"segments": [8192, 4096]}, r"params\.segments"),
-    ("torus", {"segments": [8192, 8192]}, r"params\.segments"),
-    ("bowl", {"segments": [8192, 4096]}, r"params\.segments"),
-    ("box", {"segments": 4096}, r"params\.segments"),
-    ("room", {"segments": 4096}, r"params\.segments"),
-    ("hollow_box", {"segments": 4096}, r"params\.segments"),
-    ("plane", {"segments": 4096}, r"params\.segments"),
-    ("teapot", {"segments": 4096}, r"params\.segments"),
-    ("wires", {"count": 256, "segments": 8192}, r"params\.count and params\.segments"),
-    ("gyroid", {"periods": 8.0, "grid": 400}, r"params\.periods and params\.grid"),
-]
-
-
-@pytest.mark.parametrize(("name", "params", "key"), TOO_LARGE, ids=[name for name, _, _ in TOO_LARGE])
-def test_a_shape_beyond_the_budget_is_refused_before_it_is_made(name: str, params: dict, key: str) -> None:
-    with pytest.raises(InputError, match=rf"needs .* GiB, allowed are 4\.0 GiB \({key} or --memory changes that\)"):
-        shapes.make(name, params)
-
-
-@pytest.mark.parametrize(
-    ("name", "params"),
-    [(name, {}) for name in shapes.names()]
-    + [
-        ("gyroid", {"periods": 1.0, "grid": 60}),
-        ("gyroid", {"periods": 6.0, "grid": 60}),
-        ("genus3", {"grid": 60}),
-        ("bowl", {"closed": False}),
-        ("wires", {"count": 3, "segments": 30}),
-        ("teapot", {"segments": 40}),
-        ("hollow_box", {"segments": 30}),
-    ],
-)
-def test_the_estimate_counts_the_triangles(name: str, params: dict) -> None:
-    """At least the bytes a triangle that were measured, and not many times as many: a gyroid of few periods is cut."""
-    with budget.account() as account:
-        count = len(shapes.make(name, params).faces)
-    per_triangle = (
-        shapes.KNOWN_NORMALS_BYTES
-        if name in ("box", "room", "hollow_box", "plane", "sphere", "torus")
-        else shapes.MADE_NORMALS_BYTES
-    )
-    estimate = account.taken - shapes.FIXED_BYTES
-    cells = params.get("grid", 400) ** 3 * shapes.CELL_BYTES if name in ("gyroid", "genus3") else 0
-    assert per_triangle * count <= estimate * 1.02 and estimate <= 4.0 * per_triangle * count + cells
-
-
 def test_a_scene_adds_up_and_counts_what_is_shared_once(tmp_path: Path) -> None:
     path = tmp_path / "scene.toml"
     path.write_text(SMALL_SCENE)
