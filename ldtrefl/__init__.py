@@ -44,8 +44,8 @@ if TYPE_CHECKING:
         Object,
         Reflection,
         Scene,
-        load_scene,
     )
+    from ldtrefl.scene.load import load_scene
     from ldtrefl.scene.mesh import Mesh
     from ldtrefl.scene.readers.mesh_files import load_mesh
     from ldtrefl.tracing.batch import Hits
@@ -102,7 +102,7 @@ _HOMES = {
     "keep_maps_in": "files.map_cache",
     "load_image": "files.picture_reading",
     "load_mesh": "scene.readers.mesh_files",
-    "load_scene": "scene.description",
+    "load_scene": "scene.load",
     "peel": "ldt.texture",
     "progress_to": "device.progress",
     "render": "renderer",

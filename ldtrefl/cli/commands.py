@@ -37,7 +37,8 @@ from ldtrefl.ldt.texture import DEFAULT_RESOLUTION, peel_mesh
 from ldtrefl.methods import all_methods, find_method
 from ldtrefl.renderer import Frame, Renderer
 from ldtrefl.scene import shapes
-from ldtrefl.scene.description import Scene, load_scene
+from ldtrefl.scene.description import Scene
+from ldtrefl.scene.load import load_scene
 from ldtrefl.scene.mesh import Mesh
 from ldtrefl.scene.readers.mesh_files import load_mesh
 from ldtrefl.scene.toml_text import check_regular, parse_toml

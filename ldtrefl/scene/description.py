@@ -1,4 +1,4 @@
-"""The scene: dataclasses that check themselves, and ``load_scene`` for TOML files.
+"""The scene: dataclasses that check themselves. ``load.py`` reads them from files.
 
 Conventions: right-handed, any ``up``. Angles in degrees, radiance linear RGB; one number stands for a grey. Every
 dataclass may be built in Python with the same names and checks as the file's keys; wrong values raise ``InputError``.
@@ -8,21 +8,16 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import json
 import logging
-import os
-import typing
-from pathlib import Path
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, Field, TypeAdapter, ValidationError, WrapValidator, model_validator
+from pydantic import BeforeValidator, Field, ValidatorFunctionWrapHandler, WrapValidator, model_validator
 from pydantic.dataclasses import dataclass
 
-from ldtrefl.base import budget
 from ldtrefl.base.checked import (
     CONFIG,
-    LARGEST,
     SMALLEST,
     Color,
     Direction,
@@ -39,18 +34,19 @@ from ldtrefl.base.checked import (
     plain,
     refusing_in_one_line,
 )
-from ldtrefl.base.errors import InputError, first_fault, printable, unknown_name
+from ldtrefl.base.errors import InputError, printable, unknown_name
 from ldtrefl.files.picture_reading import stored_picture
 from ldtrefl.files.stored_picture import StoredPicture
 from ldtrefl.scene import shapes
 from ldtrefl.scene.mesh import Mesh
+from ldtrefl.scene.placement import placement
 from ldtrefl.scene.readers.mesh_files import load_mesh
-from ldtrefl.scene.toml_text import read_toml
 
-MESH_PATH_VARIABLE = "LDTREFL_MESH_PATH"
 MAX_SIDE = 16384
 """Pixels along a side of an image, and objects in a scene."""
 MAX_LIGHTS = 64
+PARALLEL = 1e-9
+"""Sine of the angle between the line of sight and ``up``: below it float64's rounding decides where right is."""
 NARROWEST = 1e-6
 """Least degrees that a camera sees: at 16,384 pixels a pixel's share is still far above float64's rounding."""
 ROUNDING = 1e-6
@@ -81,7 +77,7 @@ class Camera:
         if np.abs(forward).max() < SMALLEST:
             raise ValueError(f"eye and look_at are the same point, or closer than {SMALLEST:g}")
         up = np.asarray(self.up) / np.linalg.norm(self.up)
-        if np.linalg.norm(np.cross(forward / np.linalg.norm(forward), up)) < 1e-9:  # float64 can't tell a side
+        if np.linalg.norm(np.cross(forward / np.linalg.norm(forward), up)) < PARALLEL:
             raise ValueError("up is parallel to the line from eye to look_at")
         return self
 
@@ -136,12 +132,13 @@ class Light:
         return self
 
 
-class _Unstated(tuple[float, float, float]):
-    """A colour that nobody has stated. It stays so when a material is built from another by ``dataclasses.replace``."""
+class _NotGiven(tuple[float, float, float]):
+    """The albedo of a material for which none was given. ``dataclasses.replace`` hands it on to the copy, whose albedo
+    then was not given either, and follows the copy's ``mirror``."""
 
 
-def _if_stated(value: Any, check: Any) -> Any:
-    return value if isinstance(value, _Unstated) else check(value)
+def _check_if_given(value: object, check: ValidatorFunctionWrapHandler) -> object:
+    return value if isinstance(value, _NotGiven) else check(value)
 
 
 @refusing_in_one_line
@@ -149,7 +146,7 @@ def _if_stated(value: Any, check: Any) -> Any:
 class Material:
     """``emission + albedo * texture * light + mirror * reflected radiance``."""
 
-    albedo: Annotated[Color, WrapValidator(_if_stated)] = _Unstated((0.8, 0.8, 0.8))
+    albedo: Annotated[Color, WrapValidator(_check_if_given)] = _NotGiven((0.8, 0.8, 0.8))
     """0.8 if it is not given; 0 where ``mirror`` is, because a mirror that also scatters light gives back too much."""
     texture: Text | None = None
     """A picture, times albedo; needs UVs. Without one, the mesh file's own textures count."""
@@ -160,9 +157,9 @@ class Material:
     """Schlick's approximation, with ``mirror`` as the reflectance at normal incidence."""
 
     @model_validator(mode="after")
-    def _albedo_if_unstated(self) -> Material:
-        if isinstance(self.albedo, _Unstated):
-            object.__setattr__(self, "albedo", _Unstated((0.0 if any(self.mirror) else 0.8,) * 3))
+    def _albedo_if_not_given(self) -> Material:
+        if isinstance(self.albedo, _NotGiven):
+            object.__setattr__(self, "albedo", _NotGiven((0.0 if any(self.mirror) else 0.8,) * 3))
         return self
 
     @functools.cached_property
@@ -187,7 +184,7 @@ class Object:
     mesh: Text | Mesh | None = None
     """A file that trimesh reads, or (in Python) a :class:`Mesh`."""
     shape: Text | None = None
-    params: dict[str, Any] = Field(default_factory=dict)
+    params: Mapping[str, object] = Field(default_factory=dict)
     fit: Positive | None = None
     """Centre the bounding box at 0 and scale its longest side to this, first."""
     scale: Scale = 1.0
@@ -226,6 +223,11 @@ class Object:
             return shapes.make(self.shape, self.params)
         return self.mesh if isinstance(self.mesh, Mesh) else load_mesh(str(self.mesh))
 
+    def share_geometry(self, mesh: Mesh) -> None:
+        """Take the mesh that an object of the same ``mesh``, or ``shape`` and ``params``, has made: it is then neither
+        made nor counted again."""
+        object.__setattr__(self, "geometry", mesh)
+
     @property
     def texture(self) -> StoredPicture | None:
         """The picture that ``material.texture`` names; None without one."""
@@ -252,52 +254,13 @@ class Object:
 
     @functools.cached_property
     def _world_from_object(self) -> np.ndarray:
-        low, high = self.geometry.bounds
-        side = float((high - low).max())
-        matrix = np.eye(4)
-        with np.errstate(all="ignore"):  # what is not finite is refused below
-            if self.fit is not None:
-                matrix = _scaling(self.fit / side if side > 0.0 else 1.0) @ _translation(-(low + (high - low) / 2))
-            matrix = _translation(self.translate) @ _rotation(self.rotate) @ _scaling(self.scale) @ matrix
-            sizes = np.linalg.norm(matrix[:3, :3] * (side or 1.0), axis=0)
-        if not (np.isfinite(matrix).all() and SMALLEST <= sizes.min() and sizes.max() <= LARGEST):
-            fit = "" if self.fit is None else f"fit {self.fit:g}, "
-            raise InputError(
-                f"{fit}scale {self.scale} and the mesh's own size of {side:g} give a size of {sizes.min():g} to "
-                f"{sizes.max():g} along its axes, allowed are {SMALLEST:g} to {LARGEST:g}"
-            )
-        return matrix
+        return placement(self.geometry.bounds, self.fit, self.scale, self.rotate, self.translate)
 
 
 @functools.lru_cache(maxsize=1024)
 def _warn_once(line: str) -> None:
     """Say it once: an object is built anew whenever it is moved."""
     _log.warning("%s", line)
-
-
-def _translation(offset: Any) -> np.ndarray:
-    matrix = np.eye(4)
-    matrix[:3, 3] = offset
-    return matrix
-
-
-def _scaling(factor: Any) -> np.ndarray:
-    return np.diag([*np.broadcast_to(factor, 3), 1.0]).astype(float)
-
-
-def _rotation(axis_and_degrees: tuple[float, float, float, float]) -> np.ndarray:
-    """Rodrigues' formula."""
-    axis = np.asarray(axis_and_degrees[:3], float)
-    x, y, z = axis / np.linalg.norm(axis)
-    # Whole quarter turns must be exact, so that they only permute axes.
-    degrees = axis_and_degrees[3] % 360.0
-    quarters = {0.0: (1.0, 0.0), 90.0: (0.0, 1.0), 180.0: (-1.0, 0.0), 270.0: (0.0, -1.0)}
-    cosine, sine = quarters.get(degrees, (np.cos(np.radians(degrees)), np.sin(np.radians(degrees))))
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    along = np.outer([x, y, z], [x, y, z])
-    matrix = np.eye(4)
-    matrix[:3, :3] = cosine * np.eye(3) + sine * cross + (1 - cosine) * along
-    return matrix
 
 
 @refusing_in_one_line
@@ -360,7 +323,7 @@ class Scene:
             raise unknown_name("object", name, names)
         return names.index(name)
 
-    def with_object(self, name: str, **changes: Any) -> Scene:
+    def with_object(self, name: str, **changes: object) -> Scene:
         """The same scene with other values for fields of the object called ``name``.
 
         Raises:
@@ -368,15 +331,16 @@ class Scene:
         """
         number = self.number_of(name)
         known = {entry.name for entry in dataclasses.fields(Object)}
+        values: dict[str, Any] = changes  # pydantic checks them
         for field in changes:
             if field not in known:
                 raise unknown_name("field of an object", field, known)
         try:
-            changed = dataclasses.replace(self.objects[number], **changes)
+            changed = dataclasses.replace(self.objects[number], **values)
         except InputError as error:
             raise error.within(f"object '{name}'") from None
         if not {"mesh", "shape", "params"} & set(changes):
-            changed.__dict__["geometry"] = self.objects[number].geometry  # not made again
+            changed.share_geometry(self.objects[number].geometry)
         objects = (*self.objects[:number], changed, *self.objects[number + 1 :])
         return self._laid_out_alike(dataclasses.replace(self, objects=objects))
 
@@ -384,96 +348,3 @@ class Scene:
     def environment_image(self) -> StoredPicture | None:
         """The picture that ``environment.image`` names; None without one."""
         return self.environment.picture
-
-
-_ADAPTER = TypeAdapter(Scene)
-
-
-def _allowed_keys(kind: type, table: str = "") -> dict[str, list[str]]:
-    """Table key -> the keys it may hold, for every table below ``kind``."""
-    keys: dict[str, list[str]] = {table: []}
-    hints = typing.get_type_hints(kind)
-    fields: dict[str, Any] = vars(kind)["__pydantic_fields__"]
-    for entry in dataclasses.fields(kind):
-        name = fields[entry.name].alias or entry.name
-        keys[table].append(name)
-        for inner in [hints[entry.name], *typing.get_args(hints[entry.name])]:
-            if dataclasses.is_dataclass(inner) and inner is not Mesh and isinstance(inner, type):
-                keys |= _allowed_keys(inner, f"{table}.{name}" if table else name)
-    return keys
-
-
-def load_scene(path: str | Path) -> Scene:
-    """Read a scene file (TOML), its meshes and its pictures.
-
-    Raises:
-        InputError: one line naming the file, the key, what is wrong and what is allowed.
-    """
-    path = Path(path)
-    tables = read_toml(path)
-    try:
-        scene = _ADAPTER.validate_python(tables)
-    except ValidationError as error:
-        raise first_fault(error, _allowed_keys(Scene)).within(str(path)) from None
-    except InputError as error:
-        raise error.within(str(path)) from None
-    with budget.account():
-        return _found(scene, path)
-
-
-def _found(scene: Scene, path: Path) -> Scene:
-    """The scene with every file found and read; a fault names the key."""
-    objects = []
-    meshes: dict[tuple[str | None, str, str], Mesh] = {}
-    for index, entry in enumerate(scene.objects):
-        key = f"object[{index}]"
-        mesh = entry.mesh
-        if isinstance(mesh, str):
-            mesh = _beside(path, mesh, f"{key}.mesh")
-        material = entry.material
-        if material.texture is not None:
-            found = _beside(path, material.texture, f"{key}.material.texture")
-            material = dataclasses.replace(material, texture=found)
-        placed = dataclasses.replace(entry, mesh=mesh, material=material)
-        # What several objects share is made once, and so is taken from the budget once.
-        source = entry.shape, str(mesh), json.dumps(entry.params, sort_keys=True, default=str)
-        if source in meshes:
-            placed.__dict__["geometry"] = meshes[source]
-        meshes[source] = _read(path, f"{key}.{'mesh' if entry.shape is None else 'shape'}", placed, "geometry")
-        _read(path, f"{key}.material.texture", placed, "texture")
-        if placed.material.texture is not None and placed.geometry.uvs is None:
-            raise InputError(f"{path}: {key}.material.texture: the object has no texture coordinates (UVs)")
-        _read(path, key, placed, "_world_from_object")
-        objects.append(placed)
-    environment = scene.environment
-    if environment.image is not None:
-        found = _beside(path, environment.image, "environment.image")
-        environment = dataclasses.replace(environment, image=found)
-    ready = dataclasses.replace(scene, objects=tuple(objects), environment=environment)
-    _read(path, "environment.image", ready, "environment_image")
-    return ready
-
-
-def _beside(scene_path: Path, name: str, key: str) -> str:
-    """The file called ``name`` beside the scene, or else in the folders of LDTREFL_MESH_PATH."""
-    listed = os.environ.get(MESH_PATH_VARIABLE, "").split(os.pathsep)
-    folders = [scene_path.parent, *(Path(folder) for folder in listed if folder)]
-    for folder in folders:
-        candidate = folder / name
-        try:
-            if candidate.is_file():
-                return str(candidate)
-        except (OSError, ValueError) as error:
-            raise InputError(f"{scene_path}: {key}: '{name}' is no file name ({error})") from error
-    places = "beside the scene and in LDTREFL_MESH_PATH" + ("" if len(folders) > 1 else " (which is not set)")
-    raise InputError(f"{scene_path}: {key}: no file '{name}' (looked {places})")
-
-
-def _read(path: Path, key: str, owner: Object | Scene, attribute: str) -> Any:
-    """An attribute that is read or made when it is asked for; a fault names the file and the key."""
-    try:
-        return getattr(owner, attribute)
-    except InputError as error:
-        raise InputError(f"{path}: {key}: {error}") from None
-    except MemoryError:
-        raise InputError(f"{path}: {key}: too large for this machine's memory") from None

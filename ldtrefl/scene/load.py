@@ -1,0 +1,125 @@
+"""Reading a scene file (TOML) with its meshes and its pictures.
+
+Files that a scene names are looked for beside it, then in the folders of ``LDTREFL_MESH_PATH``. A fault is one line
+that names the scene file, the key, what is wrong and what is allowed.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+import typing
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import TypeAdapter, ValidationError
+
+from ldtrefl.base import budget
+from ldtrefl.base.errors import InputError, first_fault
+from ldtrefl.scene.description import Environment, Object, Scene
+from ldtrefl.scene.mesh import Mesh
+from ldtrefl.scene.toml_text import read_toml
+
+MESH_PATH_VARIABLE = "LDTREFL_MESH_PATH"
+
+Result = TypeVar("Result")
+
+_ADAPTER = TypeAdapter(Scene)
+
+
+def _allowed_keys(kind: type, table: str = "") -> dict[str, list[str]]:
+    """Table key -> the keys it may hold, for every table below ``kind``."""
+    keys: dict[str, list[str]] = {table: []}
+    hints = typing.get_type_hints(kind)
+    fields: dict[str, Any] = vars(kind)["__pydantic_fields__"]
+    for entry in dataclasses.fields(kind):
+        name = fields[entry.name].alias or entry.name
+        keys[table].append(name)
+        for inner in [hints[entry.name], *typing.get_args(hints[entry.name])]:
+            if dataclasses.is_dataclass(inner) and inner is not Mesh and isinstance(inner, type):
+                keys |= _allowed_keys(inner, f"{table}.{name}" if table else name)
+    return keys
+
+
+def load_scene(path: str | Path) -> Scene:
+    """Read a scene file (TOML), its meshes and its pictures.
+
+    Raises:
+        InputError: one line naming the file, the key, what is wrong and what is allowed.
+    """
+    path = Path(path)
+    tables = read_toml(path)
+    try:
+        scene = _ADAPTER.validate_python(tables)
+    except ValidationError as error:
+        raise first_fault(error, _allowed_keys(Scene)).within(str(path)) from None
+    except InputError as error:
+        raise error.within(str(path)) from None
+    with budget.account():
+        return _found(scene, path)
+
+
+def _found(scene: Scene, path: Path) -> Scene:
+    """The scene with every file found and read; a fault names the key."""
+    # What several objects share is made once, and so is taken from the budget once.
+    meshes: dict[tuple[str | None, str, str], Mesh] = {}
+    objects = [_found_object(entry, f"object[{index}]", path, meshes) for index, entry in enumerate(scene.objects)]
+    environment = _found_environment(scene.environment, path)
+    return dataclasses.replace(scene, objects=tuple(objects), environment=environment)
+
+
+def _found_object(entry: Object, key: str, path: Path, meshes: dict[tuple[str | None, str, str], Mesh]) -> Object:
+    """An object with its mesh and texture read; ``meshes`` are those of the objects before it, and its own is added."""
+    mesh = _beside(path, entry.mesh, f"{key}.mesh") if isinstance(entry.mesh, str) else entry.mesh
+    material = entry.material
+    if material.texture is not None:
+        texture = _beside(path, material.texture, f"{key}.material.texture")
+        material = dataclasses.replace(material, texture=texture)
+    found = dataclasses.replace(entry, mesh=mesh, material=material)
+    source = entry.shape, str(mesh), json.dumps(entry.params, sort_keys=True, default=str)
+    if source in meshes:
+        found.share_geometry(meshes[source])
+    kind = "mesh" if entry.shape is None else "shape"
+    meshes[source] = _at(path, f"{key}.{kind}", lambda: found.geometry)
+    picture = _at(path, f"{key}.material.texture", lambda: found.texture)
+    if picture is not None and found.geometry.uvs is None:
+        raise InputError(f"{path}: {key}.material.texture: the object has no texture coordinates (UVs)")
+    _at(path, key, found.world_from_object)
+    return found
+
+
+def _found_environment(environment: Environment, path: Path) -> Environment:
+    """The environment with its picture read."""
+    key = "environment.image"
+    if environment.image is None:
+        return environment
+    found = dataclasses.replace(environment, image=_beside(path, environment.image, key))
+    _at(path, key, lambda: found.picture)
+    return found
+
+
+def _beside(scene_path: Path, name: str, key: str) -> str:
+    """The file called ``name`` beside the scene, or else in the folders of LDTREFL_MESH_PATH."""
+    listed = os.environ.get(MESH_PATH_VARIABLE, "").split(os.pathsep)
+    folders = [scene_path.parent, *(Path(folder) for folder in listed if folder)]
+    for folder in folders:
+        candidate = folder / name
+        try:
+            if candidate.is_file():
+                return str(candidate)
+        except (OSError, ValueError) as error:
+            raise InputError(f"{scene_path}: {key}: '{name}' is no file name ({error})") from error
+    places = "beside the scene and in LDTREFL_MESH_PATH" + ("" if len(folders) > 1 else " (which is not set)")
+    raise InputError(f"{scene_path}: {key}: no file '{name}' (looked {places})")
+
+
+def _at(path: Path, key: str, read: Callable[[], Result]) -> Result:
+    """What ``read`` gives; a fault names the scene file and the key."""
+    try:
+        return read()
+    except InputError as error:
+        raise InputError(f"{path}: {key}: {error}") from None
+    except MemoryError:
+        raise InputError(f"{path}: {key}: too large for this machine's memory") from None
