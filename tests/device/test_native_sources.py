@@ -40,8 +40,7 @@ SOURCES = {
     "device/vectors.h": (build.CONSTANTS, ()),
     "tracing/ray_batch.h": ({}, ("device/vectors.h",)),
     "ldt/exact/build.h": (build.CONSTANTS, ("device/vectors.h",)),
-    "ldt/exact/walk.h": (walk.CONSTANTS, ("device/vectors.h",)),
-    "ldt/exact/answer.h": (walk.CONSTANTS, ("device/vectors.h", "ldt/exact/walk.h")),
+    **{name: (walk.CONSTANTS, FILES[:number]) for number, name in enumerate(FILES) if name.startswith("ldt")},
 }
 
 

@@ -1,9 +1,7 @@
 """Rays against a tree (``tree.py``): the tracer of the exact search.
 
-The walk itself is ``tree_walk.h``: single rays, rays in packets, and rays in turn. Here stands what its answers mean:
-normals, triangles and barycentrics, and the second thoughts about patches. A ray is sent on that grazes the back of a
-closed object's patch: from outside only the front of a closed surface is seen, so it has either passed just over the
-horizon, where the next patch sticks out by its margin, or it started inside.
+The search is C++: ``rays.h`` shows its files in order, ``answer.h`` is the last. Here stand the constants that it reads
+and the calls into it.
 """
 
 from __future__ import annotations
@@ -20,10 +18,10 @@ from ldtrefl.tracing.tracer import RAY_BLOCK, Query, Tracer
 from ldtrefl.world.unit_rays import NEAR
 
 BOX_SLACK = 1.0e-6
-"""Relative rounding of where a ray enters the box about all, with some to spare: four operations."""
+"""Relative rounding of where a ray enters the box about all records, with some to spare: four operations."""
 
 NEGLIGIBLE = 1.0e-18
-"""Component of a direction below which the ray runs along the planes."""
+"""Component of a direction below which the ray is taken to run along the planes of that axis."""
 
 EDGE_ON = 2.0e-7
 """|n . direction| up to which a patch is seen edge on, to float32's rounding."""
@@ -39,22 +37,22 @@ PACKET_SPREAD = 0.25
 """Unit space: how far the starts, and the directions, of the rays of a packet may lie apart along an axis."""
 
 GRAZING = 0.35
-"""n . direction below which a hit on the back of a closed object's patch is doubted."""
+"""n . direction below which a hit on the back of a closed object's patch is doubtful."""
 
-MOST_DOUBTS = 64
-"""Doubted hits of a ray after which the next is taken as it is. Three in a row were never seen."""
+MOST_DOUBTFUL = 64
+"""Doubtful hits of a ray after which the next hit is taken as it is. Three in a row were never seen."""
 
 T_ROUNDING = 2.4e-7
-"""Two roundings of a float32."""
+"""Two roundings of a float32, relative."""
 
 FAR = 1.0e30
-"""Up to where a probe looks."""
+"""The end of a probe: it looks for whatever lies there."""
 
 FETCHED_AHEAD = 4
-"""Answers ahead of which memory is asked for what they are made of."""
+"""Rays by which the memory of a ray's record is asked for ahead of its answer."""
 
 LARGE_PATCH = wp.constant(-2.0)
-"""In place of a barycentric: still to be found, as the triangle is larger than the patch."""
+"""In place of a barycentric, on a patch whose triangle is larger: the barycentrics are still to be found."""
 
 OWN_PATCHES = wp.constant(2.0)
 """Sides of a patch from its start within which a ray may pass through patches of its own surface: a bent surface has
@@ -77,7 +75,7 @@ CONSTANTS: dict[str, float | int] = {
     "FETCHED_AHEAD": FETCHED_AHEAD,
     "GRAZING": GRAZING,
     "LARGE_PATCH": float(LARGE_PATCH),
-    "MOST_DOUBTS": MOST_DOUBTS,
+    "MOST_DOUBTFUL": MOST_DOUBTFUL,
     "NEAR": float(NEAR),
     "NEGLIGIBLE": NEGLIGIBLE,
     "OWN_RISE": OWN_RISE,
@@ -89,8 +87,21 @@ CONSTANTS: dict[str, float | int] = {
     "TREE_STACK": STACK,
     "T_ROUNDING": T_ROUNDING,
 }
-FILES = ("device/vectors.h", "ldt/exact/walk.h", "ldt/exact/answer.h")
-"""What native functions here are made of."""
+"""What the C++ reads, by the names that it has there."""
+
+FILES = (
+    "device/vectors.h",
+    "ldt/exact/rays.h",
+    "ldt/exact/boxes.h",
+    "ldt/exact/triangles.h",
+    "ldt/exact/patches.h",
+    "ldt/exact/single_rays.h",
+    "ldt/exact/packets.h",
+    "ldt/exact/rays_in_turn.h",
+    "ldt/exact/walk.h",
+    "ldt/exact/answer.h",
+)
+"""The C++ of the search, each file after those that its class is derived from."""
 
 
 TREE = """
@@ -100,6 +111,7 @@ TREE = """
     const TreeWalk::Query* asked = (const TreeWalk::Query*)queries.data;
     TreeWalk::Rays rays[TreeWalk::EIGHTS];
 """
+"""C++: the arguments of a native function as the search has them."""
 
 SEARCH = """
     TreeWalk::search(tree, rays, asked, count, view.in_turn != 0, false);
@@ -112,10 +124,10 @@ SEARCH = """
         hit.steps = own.steps[lane];
         hit.triangle = -1;
         hit.t = INFINITY;
-        if (own.met[lane] < 0) continue;
-        TreeAnswer::Answer answer = TreeAnswer::to(tree, own, lane);
-        if (view.front != 0.0f && TreeAnswer::is_doubted(tree, answer, asked[i].direction, view.front))
-            hit.steps += TreeAnswer::go_beyond(tree, asked[i], view.front, view.horizon, answer);
+        if (own.record[lane] < 0) continue;
+        TreeAnswer::Answer answer = TreeAnswer::answer_of(tree, own, lane);
+        if (view.front != 0.0f && TreeAnswer::is_doubtful(tree, answer, asked[i].direction, view.front))
+            hit.steps += TreeAnswer::search_beyond(tree, asked[i], view.front, view.horizon, answer);
         hit.triangle = answer.triangle;
         if (answer.triangle < 0) continue;
         hit.t = answer.t;
@@ -124,15 +136,17 @@ SEARCH = """
         for (int k = 0; k < 3; ++k) hit.normal[k] = answer.normal[k];
     }
 """
+"""C++: the nearest hits of rays, after :data:`TREE`."""
 
 SEARCH_FOR_ANY = """
     TreeWalk::search(tree, rays, asked, count, view.in_turn != 0, true);
     for (int i = 0; i < count; ++i) {
         const TreeWalk::Rays& own = rays[i / TreeWalk::LANES];
-        hits.data[i].triangle = own.met[i % TreeWalk::LANES] >= 0 ? 0 : -1;
+        hits.data[i].triangle = own.record[i % TreeWalk::LANES] >= 0 ? 0 : -1;
         hits.data[i].steps = own.steps[i % TreeWalk::LANES];
     }
 """
+"""C++: whether rays hit anything, after :data:`TREE`."""
 
 
 @wp.func_native(native_body(CONSTANTS, FILES, TREE + SEARCH))
@@ -143,7 +157,7 @@ def search_tree(
     count: int,
     hits: wp.array(dtype=Hit),
 ):
-    """Find what rays meet; of misses t and the triangle are set."""
+    """Find the nearest hits of ``count`` rays; of misses t and the triangle are set."""
     ...
 
 
@@ -155,13 +169,13 @@ def search_tree_for_any(
     count: int,
     hits: wp.array(dtype=Hit),
 ):
-    """Find whether rays meet anything: the triangle is 0 if they do, else -1."""
+    """Find whether ``count`` rays hit anything: the triangle is 0 if they do, else -1."""
     ...
 
 
 @wp.func
 def coordinates_under_patch(view: TreeView, triangle: int, query: Query, t: float) -> wp.vec2:
-    """Barycentrics of a hit on a patch in a triangle that is larger than that."""
+    """Barycentrics of a hit on a patch, in the triangle that the patch is part of."""
     point = as_single(point_along(query.origin, query.direction, t))
     corners = view.faces[triangle]
     return barycentrics_at(view.vertices[corners[0]], view.vertices[corners[1]], view.vertices[corners[2]], point)
