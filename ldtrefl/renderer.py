@@ -26,7 +26,7 @@ from ldtrefl.frame.result import SMALLER, BandedFrame, Frame, WholeFrame, rows_o
 from ldtrefl.frame.skips import chosen
 from ldtrefl.frame.visibility import BAND_PIXELS, draw_gbuffer, draw_in_bands
 from ldtrefl.methods import find_method
-from ldtrefl.methods.base import RayMethod
+from ldtrefl.methods.base import RaylessMethod, RayMethod
 from ldtrefl.scene.description import Camera, Scene, Vector
 from ldtrefl.tracing.nothing import no_shadows
 from ldtrefl.tracing.tracer import BoundTracer
@@ -200,6 +200,7 @@ class Renderer:
         elif isinstance(method, RayMethod):
             reflected = method.reflect_rays(gbuffer, shaded.rays, reusable, stats)
         else:
+            assert isinstance(method, RaylessMethod)
             reflected = ReflectedLight(method.reflect(gbuffer, stats))
         return FrameParts(gbuffer, shaded, reflected, tuple(stats.seconds))
 

@@ -15,6 +15,31 @@ from ldtrefl.world.records import ObjectRecord
 from ldtrefl.world.unit_rays import into_unit, start_above, start_above_own, unit_normal
 
 
+@wp.struct
+class ShadowRay:
+    """A shadow ray in an object's unit space."""
+
+    query: Query
+    outwards: wp.vec3  # as ``Tracer.occluded`` takes it
+
+
+@wp.func
+def shadow_ray(record: ObjectRecord, surface: Surface, towards: wp.vec3, distance: float, is_own: bool) -> ShadowRay:
+    """The ray that leaves a surface in unit direction ``towards``, to a light at ``distance``, in the unit space of an
+    object; ``is_own`` if it is the surface's own."""
+    ray = into_unit(record, surface.position, towards)
+    outwards = unit_normal(record, surface.facet)
+    shadow = ShadowRay()
+    shadow.query.direction = ray.way
+    shadow.query.t_max = distance * ray.stretch
+    if is_own:
+        shadow.query.origin = start_above_own(record, surface.triangle, ray.start, outwards)
+        shadow.outwards = outwards
+    else:
+        shadow.query.origin = start_above(ray.start, outwards)
+    return shadow
+
+
 @launch.once
 def direct_radiance_of(tracer: Tracer) -> Callable[..., wp.vec3]:
     """``direct_radiance`` with this tracer's shadows."""
@@ -28,22 +53,11 @@ def direct_radiance_of(tracer: Tracer) -> Callable[..., wp.vec3]:
         towards: wp.vec3,
         distance: float,
     ) -> bool:
-        own = surface.object
         for k in range(objects.shape[0]):
             entry = sphere_entry(surface.position, towards, objects[k].centre, objects[k].radius)
             if entry >= 0.0 and entry < distance:
-                ray = into_unit(objects[k], surface.position, towards)
-                outwards = unit_normal(objects[k], surface.facet)
-                start = start_above(ray.start, outwards)
-                if k == own:
-                    start = start_above_own(objects[k], surface.triangle, ray.start, outwards)
-                else:
-                    outwards = wp.vec3(0.0)
-                query = Query()
-                query.origin = start
-                query.direction = ray.way
-                query.t_max = distance * ray.stretch
-                if is_occluded(views, k, query, outwards):
+                shadow = shadow_ray(objects[k], surface, towards, distance, k == surface.object)
+                if is_occluded(views, k, shadow.query, shadow.outwards):
                     return False
         return True
 

@@ -4,8 +4,8 @@ A method is a class with a ``name`` and a ``Config``. It is made once per render
 meshes, and asked once per frame, or once for each band of a large one. It keeps nothing of a frame: what the next frame
 may use again is kept by the renderer (``frame/history.py``). It is never asked by two threads at once.
 
-A ``Method`` has no rays: it is handed the G-buffer and answers for its ``reflector_pixels``. A ``RayMethod`` is handed
-the rays that leave those pixels, too. Shadows are asked of the renderer's tracer, which the method's class chooses.
+A ``RaylessMethod`` is handed the G-buffer, and answers for its ``reflector_pixels``. A ``RayMethod`` is handed the rays
+that leave those pixels, too. Shadows are asked of the renderer's tracer, which the method's class chooses.
 """
 
 from __future__ import annotations
@@ -44,11 +44,11 @@ class CommonConfig:
 
 
 class Method(abc.ABC):
-    """A way to compute reflections without rays."""
+    """What all methods share; each is a ``RaylessMethod`` or a ``RayMethod``."""
 
     name: ClassVar[str]
-    Config: ClassVar[type]
-    """A frozen pydantic dataclass, a docstring under each field."""
+    Config: ClassVar[type] = CommonConfig
+    """A frozen pydantic dataclass that comes from ``CommonConfig``, with a docstring under each field."""
 
     def __init__(self, scene: DeviceScene, config: CommonConfig, tracer: SceneTracer) -> None:
         self.scene = scene
@@ -69,11 +69,6 @@ class Method(abc.ABC):
     def foresee(self, gbuffer: GBuffer, stats: Stats) -> None:  # noqa: B027  (most methods have nothing to foresee)
         """Make the tracer ready for what the camera sees. Called before shadow rays are asked of it, only if the scene
         has shadows."""
-
-    @abc.abstractmethod
-    def reflect(self, gbuffer: GBuffer, stats: Stats) -> wp.array:
-        """(m,) vec3: the radiance that reaches each of the G-buffer's ``reflector_pixels`` by way of the mirror, before
-        the reflector's own reflectance. Called only if there are any, unless that skip is off."""
 
     @classmethod
     def describe(cls) -> str:
@@ -107,6 +102,15 @@ class Method(abc.ABC):
             raise error.within(f"method {cls.name}") from None
 
 
+class RaylessMethod(Method):
+    """A way to compute reflections without rays: from what the camera sees."""
+
+    @abc.abstractmethod
+    def reflect(self, gbuffer: GBuffer, stats: Stats) -> wp.array:
+        """(m,) vec3: the radiance that reaches each of the G-buffer's ``reflector_pixels`` by way of the mirror, before
+        the reflector's own reflectance. Called only if there are any, unless that skip is off."""
+
+
 class RayMethod(Method):
     """A way to compute reflections by rays."""
 
@@ -120,7 +124,3 @@ class RayMethod(Method):
             rays: one for each of these pixels, or several in a row, in the order of the pixels. They stay as they are.
             reusable: the last frame's answer, if the same camera saw it, and what has moved since.
         """
-
-    def reflect(self, gbuffer: GBuffer, stats: Stats) -> wp.array:
-        """A method with rays is handed them."""
-        raise NotImplementedError
