@@ -40,8 +40,9 @@ class DeviceScene:
         self._skip_attributes = skip_attributes
         self._decoded = wp.array(linear_of_bytes(), dtype=float, device=device, copy=False)
         self.device_from_world = device_space(scene.layout_box)
-        self.triangle_count, self.vertex_count = self._counts()
-        self.objects = self._placed_objects(before)
+        meshes = self._device_meshes(before)
+        self.triangle_count, self.vertex_count = _counts(meshes)
+        self.objects = self._placed_objects(meshes, before)
         self.records = wp.array([entry.record for entry in self.objects], dtype=ObjectRecord, device=device)
         same_picture = before is not None and before.scene.environment is scene.environment
         lighting_before: LightingRecord | None = before.lighting if before is not None and same_picture else None
@@ -50,32 +51,21 @@ class DeviceScene:
         )
         self.look_from(scene.camera)
 
-    def _counts(self) -> tuple[int, int]:
-        """(triangles, vertices) of all objects.
+    def _device_meshes(self, before: DeviceScene | None) -> list[DeviceMesh]:
+        """Each object's mesh. Equal meshes are one, and those of ``before`` are taken over."""
+        known = {} if before is None else {entry.geometry.mesh.key: entry.geometry for entry in before.objects}
+        for mesh in (source.geometry for source in self.scene.objects):
+            if mesh.key not in known:
+                known[mesh.key] = DeviceMesh(mesh, self.device)
+        return [known[source.geometry.key] for source in self.scene.objects]
 
-        Raises:
-            InputError: they are more than can be numbered.
-        """
-        triangles = vertices = 0
-        for source in self.scene.objects:
-            triangles += len(source.geometry.faces)
-            vertices += len(source.geometry.vertices)
-            for count, what in ((triangles, "triangles"), (vertices, "vertices")):
-                if count > MOST_NUMBERS:
-                    raise InputError(f"the objects have more than {MOST_NUMBERS} {what}, instances counted in")
-        return triangles, vertices
-
-    def _placed_objects(self, before: DeviceScene | None) -> list[DeviceObject]:
-        """The objects in device space, those that stand where they stood taken over: device space is the same."""
+    def _placed_objects(self, meshes: list[DeviceMesh], before: DeviceScene | None) -> list[DeviceObject]:
+        """The objects in device space. Those that stand where they stood in ``before`` are taken over: device space is
+        the same."""
         former = [] if before is None else before.objects
-        meshes = {entry.geometry.mesh.key: entry.geometry for entry in former}
         placed: list[DeviceObject] = []
         first_triangle = first_vertex = 0
-        for index, source in enumerate(self.scene.objects):
-            key = source.geometry.key
-            if key not in meshes:
-                meshes[key] = DeviceMesh(source.geometry, self.device)
-            geometry = meshes[key]
+        for index, (source, geometry) in enumerate(zip(self.scene.objects, meshes, strict=True)):
             if former and former[index].source is source:
                 placed.append(former[index])
             else:
@@ -117,3 +107,19 @@ class DeviceScene:
         """Turn the environment to the camera's ``up``. The owner of the scene does so before every frame, and makes one
         frame at a time."""
         self.lighting.up = wp.vec3(*unit_up(camera))
+
+
+def _counts(meshes: list[DeviceMesh]) -> tuple[int, int]:
+    """(triangles, vertices) of all objects, given the mesh of each.
+
+    Raises:
+        InputError: they are more than can be numbered.
+    """
+    triangles = vertices = 0
+    for entry in meshes:
+        triangles += len(entry.mesh.faces)
+        vertices += len(entry.mesh.vertices)
+        for count, what in ((triangles, "triangles"), (vertices, "vertices")):
+            if count > MOST_NUMBERS:
+                raise InputError(f"the objects have more than {MOST_NUMBERS} {what}, instances counted in")
+    return triangles, vertices

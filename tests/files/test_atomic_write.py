@@ -197,3 +197,13 @@ def test_the_longest_name_can_be_written(tmp_path: Path) -> None:
     name = "n" * 251 + ".png"
     ldtrefl.save_image(tmp_path / name, noise())
     assert os.listdir(tmp_path) == [name]
+
+
+def test_nothing_is_left_behind_when_writing_fails(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("ldtrefl.files.whole.os.replace", fail)
+    with pytest.raises(ldtrefl.InputError, match=r"a\.png: cannot be written \(No space left on device\)"):
+        ldtrefl.save_image(tmp_path / "a.png", np.zeros((4, 4, 3), np.float32))
+    assert list(tmp_path.iterdir()) == []

@@ -135,3 +135,24 @@ def test_normals_are_one_a_vertex() -> None:
     plane = shapes.make("plane", {})
     with pytest.raises(ldtrefl.InputError, match=f"3 normals for {len(plane.vertices)} vertices"):
         plane.with_normals(np.eye(3))
+
+
+@pytest.mark.parametrize(
+    ("vertices", "faces", "message"),
+    [
+        (np.zeros((0, 3)), np.zeros((0, 3), int), "no triangles"),
+        (np.eye(3), np.zeros((0, 3), int), "no triangles"),
+        (np.eye(3), [[0, 1, 3]], r"triangle 0 has vertices \[0, 1, 3\], allowed are 0 to 2"),
+        (np.eye(3), [[0, 1, 2], [0, -1, 2]], "triangle 1 has vertices"),
+        (np.where(np.eye(3) > 0, np.nan, 0), [[0, 1, 2]], "vertex 0 is not finite"),
+        (np.diag([1, np.inf, 1]), [[0, 1, 2]], "vertex 1 is not finite"),
+        (np.eye(2), [[0, 1, 2]], r"vertices must have shape \(n, 3\), got \(2, 2\)"),
+        (np.eye(3), [[0, 1]], r"faces must have shape \(n, 3\)"),
+        (np.eye(3), [[0.5, 1, 2]], "whole numbers"),
+        ("corner", [[0, 1, 2]], "vertices must be numbers"),
+    ],
+)
+def test_wrong_arrays(vertices: object, faces: object, message: str) -> None:
+    for maker in (ldtrefl.peel, ldtrefl.Raycaster):
+        with pytest.raises(ldtrefl.InputError, match=message):
+            maker(vertices, faces)

@@ -1,6 +1,8 @@
 """What is true of every shape: every file of the folder that is found is checked here by itself."""
 
+import gc
 import re
+import weakref
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, get_type_hints
@@ -160,3 +162,9 @@ def test_a_fault_is_named_in_one_line(name: str, params: dict[str, object], mess
 def test_equal_calls_share_a_mesh() -> None:
     mesh = shapes.make("torus", {"segments": [10, 6]})
     assert shapes.make("torus", {"segments": np.array([10, 6])}) is mesh is not shapes.make("torus")
+
+
+def test_a_shape_goes_when_nobody_uses_it() -> None:
+    mesh = weakref.ref(shapes.make("torus_knot", {"segments": [50, 7]}))
+    gc.collect()
+    assert mesh() is None
