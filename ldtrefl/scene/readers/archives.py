@@ -9,7 +9,7 @@ import tarfile
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
-from typing import Any
+from typing import BinaryIO, cast
 
 from trimesh import resolvers
 from trimesh.exchange.load import mesh_formats
@@ -28,7 +28,7 @@ CHUNK = 1 << 24
 
 
 class _FilesBeside(resolvers.FilePathResolver):
-    """The files of a mesh file's folder: plain ones, in memory that was asked for first."""
+    """Reads files of a mesh file's folder, plain ones alone, once the memory for them has been asked for."""
 
     def get(self, name: str) -> bytes:
         """The bytes of a file.
@@ -56,7 +56,7 @@ def archive_kind(path: str | Path) -> str | None:
     return next((ending for ending in ARCHIVES if str(path).lower().endswith(ending)), None)
 
 
-def mesh_files(path: str) -> Iterator[tuple[bytes, str, Any]]:
+def mesh_files(path: str) -> Iterator[tuple[bytes, str, resolvers.Resolver]]:
     """Every mesh file in a file: (its bytes, its kind such as 'obj', trimesh's resolver for the files beside it).
 
     Raises:
@@ -67,7 +67,7 @@ def mesh_files(path: str) -> Iterator[tuple[bytes, str, Any]]:
         budget.take(Path(path).stat().st_size, "the file")
         yield Path(path).read_bytes(), _kind(path), _FilesBeside(path)
         return
-    members = {".zip": _of_zip, ".bz2": _of_bz2}.get(kind, _of_tar)(path)
+    members = {".zip": _zip_members, ".bz2": _bz2_members}.get(kind, _tar_members)(path)
     beside = resolvers.ZipResolver({name: io.BytesIO(data) for name, data in members.items()})
     found = [name for name in members if _kind(name) in mesh_formats() and not _is_hidden(name)]
     if not found:
@@ -81,11 +81,11 @@ def _kind(name: str) -> str:
 
 
 def _is_hidden(name: str) -> bool:
-    """What macOS adds to an archive."""
+    """Whether a file of an archive is one of those that macOS adds."""
     return any(part == "__MACOSX" or part.startswith("._") for part in PurePosixPath(name).parts)
 
 
-def _of_zip(path: str) -> dict[str, bytes]:
+def _zip_members(path: str) -> dict[str, bytes]:
     with zipfile.ZipFile(path) as archive:
         entries = [entry for entry in archive.infolist() if not entry.is_dir()]
         _check_number(len(entries))
@@ -94,10 +94,10 @@ def _of_zip(path: str) -> dict[str, bytes]:
         return {entry.filename: archive.read(entry) for entry in entries}
 
 
-def _of_tar(path: str) -> dict[str, bytes]:
+def _tar_members(path: str) -> dict[str, bytes]:
     # Unpacked as a whole first: the reader of tar files takes the lengths of names and headers from the file.
     opener = gzip.open if path.lower().endswith("gz") else bz2.open
-    with opener(path) as stream, tarfile.open(fileobj=_unpacked(stream), mode="r:") as archive:
+    with opener(path) as stream, tarfile.open(fileobj=_unpacked(cast(BinaryIO, stream)), mode="r:") as archive:
         members = {}
         for number, entry in enumerate(archive):
             _check_number(number)
@@ -108,12 +108,13 @@ def _of_tar(path: str) -> dict[str, bytes]:
         return members
 
 
-def _of_bz2(path: str) -> dict[str, bytes]:
+def _bz2_members(path: str) -> dict[str, bytes]:
     with bz2.open(path) as stream:
-        return {Path(path).stem: _unpacked(stream).getvalue()}
+        return {Path(path).stem: _unpacked(cast(BinaryIO, stream)).getvalue()}
 
 
-def _unpacked(stream: Any) -> io.BytesIO:
+def _unpacked(stream: BinaryIO) -> io.BytesIO:
+    """All bytes of a stream, whose memory is asked for as they come."""
     result = io.BytesIO()
     while chunk := stream.read(CHUNK):
         budget.take(len(chunk), "what the archive holds")

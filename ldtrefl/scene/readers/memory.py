@@ -11,40 +11,47 @@ import zipfile
 from io import BytesIO
 from typing import Any
 
-from ldtrefl.scene.readers.mesh_polygons import has_polygons
+from ldtrefl.scene.readers.polygon_files import has_polygons
 
 BYTES_PER_VERTEX = 160.0
-"""To join, weld and smooth pieces, what the mesh itself takes included."""
+"""A vertex while pieces are joined, welded and smoothed, the mesh itself included."""
 
 BYTES_PER_TRIANGLE = 90.0
-"""The same for a triangle."""
+"""A triangle, likewise."""
 
 TEXT = 5.0
-"""Bytes per byte of a text file, apart from its words."""
+"""Bytes per byte of a text file; ``BYTES_PER_WORD`` comes on top."""
 
 BYTES_PER_WORD = {"obj": 85.0, "ply": 125.0, "off": 150.0}
-"""Words of a text file end with a blank, the line's end or a slash."""
+"""A word of a text file of triangles. A word ends with a blank, the line's end or a slash."""
 
 BYTES_PER_WORD_WITH_POLYGONS = {"obj": 200.0, "ply": 230.0, "off": 150.0}
+"""A word of a text file of polygons."""
 
 BINARY = {"stl": 5.0, "ply": 5.0, "glb": 4.0}
 """Bytes per byte of a binary file."""
 
 BINARY_WITH_POLYGONS = 30.0
-"""The same for a PLY file of polygons."""
+"""Bytes per byte of a binary PLY file of polygons."""
 
 OTHER = 40.0
-"""Bytes per byte of what else there is: XML, for the most part."""
+"""Bytes per byte of files of other kinds, most of which are XML."""
 
 JSON = 60.0
 """Bytes per byte of the JSON in a glTF file: its nodes and primitives become objects."""
 
+# glTF's names of the types of numbers, and of the tuples that they make.
 COMPONENT_BYTES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
 COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 
 
 def reading_bytes(data: bytes, kind: str) -> float:
-    """Bytes that it takes to read a mesh file of some kind ('obj', 'glb'), besides its own."""
+    """Bytes that it takes to read a mesh file, besides the file itself, which is in ``data``.
+
+    Args:
+        data: the file.
+        kind: how its name ends, such as 'obj' or 'glb'.
+    """
     if kind in ("glb", "gltf"):
         return _gltf_bytes(data, kind)
     if kind in ("3mf", "3dxml", "zae"):
@@ -62,7 +69,8 @@ def reading_bytes(data: bytes, kind: str) -> float:
 
 
 def _gltf_bytes(data: bytes, kind: str) -> float:
-    """Readers copy every view and every accessor of a glTF file, and fill with zeros what has no view."""
+    """Bytes for a glTF file: trimesh copies every view and every accessor, and makes accessors without a view of
+    zeros."""
     header = data
     if kind == "glb":
         length = int.from_bytes(data[12:16], "little")
@@ -85,5 +93,5 @@ def _accessor_bytes(accessor: dict[str, Any]) -> float:
     return kind * items * _length(accessor["count"])
 
 
-def _length(value: Any) -> float:
+def _length(value: float) -> float:
     return max(0.0, float(value))

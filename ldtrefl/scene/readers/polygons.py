@@ -16,7 +16,7 @@ SMALLEST_REFLEX = 1e-6
 """Sine of a turn the wrong way from which a corner points inwards: what float32 does to a straight line is less."""
 
 BLOCK = 1 << 18
-"""Corners that are looked at at a time."""
+"""Corners of polygons that are cut at a time."""
 
 MOST_WORK = 1 << 28
 """The sum of the squares of the corners of all polygons of more than four that are not convex: the time to cut one can
@@ -51,13 +51,23 @@ def triangles_of(points: np.ndarray, sizes: np.ndarray) -> np.ndarray:
 
 
 def _fan(size: int) -> np.ndarray:
+    """(size - 2, 3): how a convex polygon is cut."""
     if size == 4:
         return np.array([[0, 1, 2], [2, 3, 0]])
     return np.stack([np.zeros(size - 2, np.int64), np.arange(1, size - 1), np.arange(2, size)], 1)
 
 
 def _cut_concave(cuts: np.ndarray, points: np.ndarray, allowed: int) -> int:
-    """Cut those of (p, n, 3) polygons anew that have a corner which points inwards; how many of more than four."""
+    """Cut polygons that have a corner which points inwards anew.
+
+    Args:
+        cuts: (p, n - 2, 3), the triangles of each polygon, to be changed.
+        points: (p, n, 3), the polygons.
+        allowed: the largest sum of the squares of their corners.
+
+    Returns:
+        How many polygons of more than four corners were cut anew.
+    """
     arriving = points - np.roll(points, 1, axis=1)
     leaving = np.roll(arriving, -1, axis=1)
     # Newell's normal; from the first corner, so that a polygon far from the origin keeps its digits.
@@ -70,8 +80,8 @@ def _cut_concave(cuts: np.ndarray, points: np.ndarray, allowed: int) -> int:
     concave = np.flatnonzero(is_reflex.any(axis=1))
     if points.shape[1] == 4:
         # The cut starts at the corner that points inwards.
-        from_odd = concave[~is_reflex[concave][:, ::2].any(axis=1)]
-        cuts[from_odd] = [[1, 2, 3], [3, 0, 1]]
+        points_in_at_odd = concave[~is_reflex[concave][:, ::2].any(axis=1)]
+        cuts[points_in_at_odd] = [[1, 2, 3], [3, 0, 1]]
         return 0
     if len(concave) * points.shape[1] ** 2 > allowed:
         raise InputError(
@@ -94,7 +104,7 @@ def _flattened(points: np.ndarray, normal: np.ndarray) -> np.ndarray:
 
 
 def _earcut(points: np.ndarray) -> np.ndarray | None:
-    """(n - 2, 3) triangles of a counter-clockwise polygon; None if it crosses itself so that there are none."""
+    """(n - 2, 3) triangles of a counter-clockwise polygon; None where it crosses itself and so cannot be cut."""
     count = len(points)
     flat = mapbox_earcut.triangulate_float64(points, np.array([count], np.uint32)).astype(np.int64).reshape(-1, 3)
     a, b, c = (points[flat[:, k]] for k in range(3))

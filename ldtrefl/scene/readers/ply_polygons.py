@@ -1,13 +1,11 @@
-"""Mesh files with polygons -> the same files with triangles.
+"""PLY files with polygons -> the same files with triangles.
 
-The reader behind cuts every polygon from its first corner, gives triangles of different polygons in another order than
-the file's, and refuses binary PLY files whose polygons differ in size. So a file that has polygons of more than three
-corners is written anew in memory, each polygon replaced by its triangles. Files of triangles pass as they are.
+A PLY file is a header and a table for each of its elements. The tables before the faces are kept as they are, the faces
+are written anew, without properties but their corners and the corners' texture coordinates.
 """
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,92 +17,13 @@ PLY_TYPES = {
     **{"uint16": "u2", "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4", "int64": "i8", "uint64": "u8"},
     **{"float": "f4", "float32": "f4", "double": "f8", "float64": "f8"},
 }
+
 FACES = "face"
+
 VERTEX_LISTS = ("vertex_indices", "vertex_index")
+
 CORNER_LIST = "texcoord"
 """A list of two numbers for each corner of a polygon."""
-
-
-OBJ_POLYGON = re.compile(rb"^[ \t]*f(?:[ \t]+[^\s#]+){4}|^[ \t]*f[^\n#]*-", re.MULTILINE)
-"""A face of four corners, or one with relative numbers."""
-
-
-def has_polygons(data: bytes, kind: str) -> bool:
-    """Whether a mesh file of some kind may hold polygons of more than three corners. Takes little memory."""
-    if kind == "obj":
-        return OBJ_POLYGON.search(data) is not None or b"\\\n" in data or b"\\\r" in data
-    if kind == "ply":
-        table = _PlyFile.of(data)
-        return table is not None and not table.is_of_triangles()
-    return kind == "off"
-
-
-def in_triangles(data: bytes, kind: str) -> bytes:
-    """A mesh file that may have polygons with triangles in their place."""
-    return {"obj": _obj, "off": _off, "ply": _ply}[kind](data)
-
-
-def _obj(data: bytes) -> bytes:
-    """Relative numbers of vertices become absolute ones, too."""
-    lines = data.replace(b"\r\n", b"\n").replace(b"\\\n", b"").split(b"\n")
-    counts = {b"v": 0, b"vt": 0, b"vn": 0}
-    faces: list[int] = []
-    flat: list[bytes] = []
-    sizes: list[int] = []
-    vertices: list[bytes] = []
-    for number, line in enumerate(lines):
-        kind, _, rest = line.strip().partition(b" ")
-        if kind == b"f":
-            corners = rest.partition(b"#")[0].split()
-            if b"-" in rest:
-                corners = [_absolute(corner, tuple(counts.values())) for corner in corners]
-            if len(corners) >= 3:
-                faces.append(number)
-                flat += corners
-                sizes.append(len(corners))
-        elif kind in counts:
-            counts[kind] += 1
-            if kind == b"v":
-                vertices.append(rest)
-    points = np.array([line.split()[:3] for line in vertices], np.float64)
-    numbers = np.array([int(corner.partition(b"/")[0]) - 1 for corner in flat])
-    triangles = triangles_of(points[numbers], np.array(sizes))
-    k = 0
-    for number, size in zip(faces, sizes, strict=True):
-        rows = triangles[k : k + size - 2].tolist()
-        lines[number] = b"\n".join(b"f " + b" ".join(flat[corner] for corner in row) for row in rows)
-        k += size - 2
-    return b"\n".join(lines)
-
-
-def _absolute(corner: bytes, counts: tuple[int, ...]) -> bytes:
-    """A corner's numbers of vertex, texture coordinate and normal, counted from 1 in place of from the end."""
-    numbers = corner.split(b"/")
-    for k, number in enumerate(numbers):
-        if number.startswith(b"-"):
-            numbers[k] = str(counts[k] + 1 + int(number)).encode()
-    return b"/".join(numbers)
-
-
-def _off(data: bytes) -> bytes:
-    lines = [line for line in (line.partition(b"#")[0].strip() for line in data.splitlines()) if line]
-    # The counts stand behind the word or below it.
-    word, _, behind = lines[0].partition(b" ")
-    if word not in (b"OFF", b"COFF"):
-        return data
-    rows = ([behind] if behind else []) + lines[1:]
-    vertex_count, polygon_count = (int(number) for number in rows[0].split()[:2])
-    head, body = rows[1 : 1 + vertex_count], rows[1 + vertex_count : 1 + vertex_count + polygon_count]
-    polygons = [row.split() for row in body]
-    sizes = np.array([int(row[0]) for row in polygons])
-    if not (sizes > 3).any():
-        return data
-    polygons = [row[1 : 1 + size] for row, size in zip(polygons, sizes.tolist(), strict=True) if size >= 3]
-    flat = np.array([int(number) for row in polygons for number in row])
-    points = np.array([row.split()[:3] for row in head], np.float64)
-    triangles = flat[triangles_of(points[flat], sizes[sizes >= 3])]
-    body = [b"3 %d %d %d" % tuple(row) for row in triangles.tolist()]
-    return b"\n".join([word, b"%d %d 0" % (vertex_count, len(body)), *head, *body, b""])
 
 
 @dataclass(frozen=True)
@@ -125,7 +44,7 @@ class _Element:
     properties: list[_Property]
 
     def row(self, lengths: dict[str, int]) -> np.dtype:
-        """A row whose lists are so long; a list's length is called 'n ' and its name."""
+        """The type of a row whose lists, by name, have these lengths. A list's length is called 'n ' and its name."""
         fields: list[tuple[str, str, int] | tuple[str, str]] = []
         for entry in self.properties:
             if entry.length:
@@ -144,8 +63,8 @@ _Lists = dict[str, tuple[np.ndarray, np.ndarray]]
 
 
 @dataclass(frozen=True)
-class _PlyFile:
-    """A PLY file's tables up to its faces."""
+class PlyFile:
+    """Where a PLY file's vertices and faces are, and of what kinds their properties are."""
 
     data: bytes
     header: list[str]
@@ -162,8 +81,8 @@ class _PlyFile:
     """The first byte after the header."""
 
     @staticmethod
-    def of(data: bytes) -> _PlyFile | None:
-        """None if the file has no faces, or not where they can be found."""
+    def of(data: bytes) -> PlyFile | None:
+        """The file's tables; None if it has no faces, or their place depends on lists that stand before them."""
         begin = data.find(b"\n", data.find(b"end_header")) + 1
         header = data[:begin].decode("utf-8", "replace").splitlines()
         elements, order = _ply_elements(header)
@@ -177,16 +96,16 @@ class _PlyFile:
             return None
         rows = [element.count * (element.row({}).itemsize if order else 1) for element in before]
         starts = np.cumsum([begin if order else 0, *rows]).tolist()
-        return _PlyFile(data, header, order, elements[vertex], faces, corners[0], starts[vertex], starts[place], begin)
+        return PlyFile(data, header, order, elements[vertex], faces, corners[0], starts[vertex], starts[place], begin)
 
     def is_of_triangles(self) -> bool:
-        """Whether every face is one, as far as can be seen without reading them all one by one."""
+        """Whether every face is a triangle. Where that would take reading the faces one by one, the answer is no."""
         if not self.faces.count:
             return True
         if self.order:
-            alike = _alike(self.data, self.faces, self.face_start)
+            alike = _lists_of_one_length(self.data, self.faces, self.face_start)
             return alike is not None and int(alike[0][self.corners][0][0]) == 3
-        # In text the count comes first, if it does.
+        # In text a face's line most often begins with its number of corners.
         letters = np.frombuffer(self.data, np.uint8)
         lines = np.flatnonzero(letters[self.begin :] == ord("\n"))[self.face_start - 1 :][: self.faces.count]
         firsts = lines + self.begin + 1
@@ -211,15 +130,16 @@ class _PlyFile:
         return points, lists, b"".join(lines[: self.face_start]), b"".join(lines[end:])
 
 
-def _ply(data: bytes) -> bytes:
-    file = _PlyFile.of(data)
+def ply_in_triangles(data: bytes) -> bytes:
+    """A PLY file with triangles in the place of its polygons; faces of fewer than three corners are left out."""
+    file = PlyFile.of(data)
     if file is None:
         return data
     points, lists, head, tail = file.tables()
     sizes, flat = lists[file.corners]
-    is_kept = sizes >= 3
-    kept = np.flatnonzero(np.repeat(is_kept, sizes))
-    corners = kept[triangles_of(points[flat[kept]], sizes[is_kept])]
+    is_polygon = sizes >= 3
+    of_polygons = np.flatnonzero(np.repeat(is_polygon, sizes))
+    corners = of_polygons[triangles_of(points[flat[of_polygons]], sizes[is_polygon])]
     pairs = None
     if CORNER_LIST in lists and np.array_equal(lists[CORNER_LIST][0], 2 * sizes):
         pairs = lists[CORNER_LIST][1].reshape(-1, 2)[corners].reshape(-1, 6)
@@ -245,7 +165,7 @@ def _ply_elements(header: list[str]) -> tuple[list[_Element], str]:
 
 
 def _ply_header(header: list[str], triangles: int, has_pairs: bool) -> list[str]:
-    """The header for so many triangles, which have no properties but lists of their corners."""
+    """The header, with as many faces as there are triangles and no properties of faces but lists of their corners."""
     lines, is_face = [], False
     for line in header:
         words = line.split()
@@ -261,7 +181,7 @@ def _ply_header(header: list[str], triangles: int, has_pairs: bool) -> list[str]
 
 def _binary_lists(data: bytes, element: _Element, begin: int) -> tuple[_Lists, int]:
     """The lists of a table that begins at a byte of the file, and the byte at which it ends."""
-    if alike := _alike(data, element, begin):
+    if alike := _lists_of_one_length(data, element, begin):
         return alike
     lists = [entry for entry in element.properties if entry.length]
     chunks: dict[str, list[bytes]] = {entry.name: [] for entry in lists}
@@ -290,8 +210,8 @@ def _binary_row(
     return at
 
 
-def _alike(data: bytes, element: _Element, begin: int) -> tuple[_Lists, int] | None:
-    """:func:`_binary_lists` of a table whose rows all have lists of the same lengths; None if they have not."""
+def _lists_of_one_length(data: bytes, element: _Element, begin: int) -> tuple[_Lists, int] | None:
+    """What :func:`_binary_lists` gives, for a table whose rows all have lists of the same lengths; None for others."""
     chunks: dict[str, list[bytes]] = {entry.name: [] for entry in element.properties}
     lengths: dict[str, list[int]] = {entry.name: [] for entry in element.properties if entry.length}
     if not element.count or _binary_row(data, element, begin, chunks, lengths) > len(data):
@@ -308,6 +228,7 @@ def _alike(data: bytes, element: _Element, begin: int) -> tuple[_Lists, int] | N
 
 
 def _text_lists(lines: list[bytes], element: _Element) -> _Lists:
+    """The lists of a table of text, a line for each row."""
     words: dict[str, list[bytes]] = {entry.name: [] for entry in element.properties if entry.length}
     lengths: dict[str, list[int]] = {name: [] for name in words}
     for row in (line.split() for line in lines):
@@ -324,7 +245,8 @@ def _text_lists(lines: list[bytes], element: _Element) -> _Lists:
 
 
 def _ply_triangles(corners: np.ndarray, pairs: np.ndarray | None, order: str) -> bytes:
-    """The rows of a table of triangles: (m, 3) numbers of vertices, and (m, 6) texture coordinates if there are any."""
+    """The table of the triangles, whose corners are (m, 3) numbers of vertices and, if given, (m, 6) texture
+    coordinates."""
     fields: list[tuple] = [("n", "u1"), ("corners", f"{order or '<'}i4", 3)]
     fields += [] if pairs is None else [("n pairs", "u1"), ("pairs", f"{order or '<'}f8", 6)]
     table = np.zeros(len(corners), fields)

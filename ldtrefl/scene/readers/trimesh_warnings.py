@@ -1,4 +1,5 @@
-"""What trimesh says while it reads a file: it would print it, tracebacks too, where a program has set up no logging."""
+"""The warnings that trimesh logs while it reads a file. Where a program has set up no logging they would be printed,
+tracebacks included."""
 
 from __future__ import annotations
 
@@ -9,7 +10,7 @@ from contextlib import contextmanager
 
 
 class _Collector(logging.Handler):
-    """Keeps what one thread is told."""
+    """Collects the warnings that are logged by the thread that made it."""
 
     def __init__(self) -> None:
         super().__init__(logging.WARNING)
@@ -23,7 +24,7 @@ class _Collector(logging.Handler):
 
 
 @contextmanager
-def words_of_reader() -> Iterator[list[str]]:
+def trimesh_warnings() -> Iterator[list[str]]:
     """The warnings that trimesh gives in this thread inside this block, a line each."""
     log, collector = logging.getLogger("trimesh"), _Collector()
     log.addHandler(collector)

@@ -1,0 +1,194 @@
+"""A mesh file in memory -> its pieces: runs of triangles with one material, where the file's scene places them.
+
+trimesh's readers read the file. What they return is walked here: each piece is placed by the nodes of the file's
+scene, its normals by the inverse transpose, and a mirrored piece is wound the other way, so that it keeps its outside.
+"""
+
+from __future__ import annotations
+
+import io
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import trimesh
+from numpy.typing import ArrayLike
+from trimesh.exchange.load import mesh_loaders
+from trimesh.resolvers import Resolver
+
+from ldtrefl.scene.mesh import Mesh
+from ldtrefl.scene.readers.ply_polygons import CORNER_LIST, FACES
+from ldtrefl.scene.readers.polygon_files import has_polygons, in_triangles
+from ldtrefl.scene.readers.polygons import triangles_of
+from ldtrefl.scene.welding import first_of_equals
+
+NEAR_UNIT = 1e-3
+"""How far from 1 the length of a stored normal may be, which is then left as it is; others are made unit vectors."""
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """A run of triangles with one material, in the coordinates of the file's scene."""
+
+    vertices: np.ndarray
+    """(n, 3) float64."""
+    faces: np.ndarray
+    """(m, 3) int64."""
+    normals: np.ndarray | None
+    """(n, 3) float64, as stored."""
+    visual: Any
+    """trimesh's: ``uv`` and ``material``."""
+
+
+def pieces_of(data: bytes, kind: str, beside: Resolver) -> list[Piece]:
+    """The pieces of a mesh file in the order of its nodes, where these place them.
+
+    Args:
+        data: the file.
+        kind: how its name ends, such as 'obj' or 'glb'.
+        beside: reads the files that it names.
+
+    Raises:
+        InputError: a triangle has a vertex that there is not. Other exceptions: the file is damaged.
+    """
+    options = {"fix_texture": False} if kind == "ply" else {}
+    if kind in ("obj", "off"):
+        data = _as_utf8(data)
+    if has_polygons(data, kind):
+        data = in_triangles(data, kind)
+    read = mesh_loaders[kind](file_obj=io.BytesIO(data), file_type=kind, resolver=beside, metadata=None, **options)
+    if kind == "ply":
+        read = _split_by_texture(read)
+    if "geometry" not in read:
+        geometry, nodes = {"": read}, [{"geometry": "", "frame_to": ""}]
+    else:
+        geometry = read["geometry"]
+        nodes = read.get("graph") or [{"geometry": name, "frame_to": name} for name in geometry]
+    own = {name: piece for name, entry in geometry.items() if (piece := _piece(entry)) is not None}
+    placed = _placed([_node(node) for node in nodes], read.get("base_frame", "world"))
+    return [_moved(own[name], matrix) for name, matrix in placed if name in own]
+
+
+def _as_utf8(data: bytes) -> bytes:
+    """A text file without a byte order mark; what is not UTF-8, as some comments, is taken for Latin-1."""
+    data = data.removeprefix(b"\xef\xbb\xbf")
+    try:
+        data.decode()
+    except UnicodeDecodeError:
+        return data.decode("latin-1").encode()
+    return data
+
+
+def _piece(entry: dict[str, Any]) -> Piece | None:
+    """A geometry of the reader's as a piece; None if it has no triangles."""
+    faces, vertices = entry.get("faces"), entry.get("vertices")
+    if faces is None or vertices is None or len(faces) == 0:
+        return None
+    faces = np.asarray(faces)
+    if faces.ndim == 2 and faces.shape[1] == 4:
+        faces = faces.reshape(-1)[triangles_of(np.asarray(vertices, float)[faces.reshape(-1)], np.full(len(faces), 4))]
+    vertices = np.asarray(vertices, np.float64)
+    if vertices.ndim == 2 and faces.ndim == 2 and faces.dtype.kind in "iu":
+        if int(faces.min()) < 0 or int(faces.max()) >= len(vertices):
+            Mesh(vertices, faces)  # says which triangle
+    return Piece(vertices, faces, _stored_normals(entry.get("vertex_normals"), vertices), entry.get("visual"))
+
+
+def _stored_normals(stored: ArrayLike | None, vertices: np.ndarray) -> np.ndarray | None:
+    """(n, 3) float64 normals as a file holds them; None if it has none that can be used.
+
+    Those that are not finite become 0, which means undefined. Those far from unit length become unit vectors.
+    """
+    if stored is None or np.shape(stored) != vertices.shape:
+        return None
+    normals = np.array(stored, np.float64)
+    normals[~np.isfinite(normals).all(axis=1)] = 0.0
+    lengths = np.sqrt(np.einsum("ij,ij->i", normals, normals))
+    if not lengths.any():
+        return None
+    is_far_from_unit = (np.abs(lengths - 1.0) > NEAR_UNIT) & (lengths > 0.0)
+    normals[is_far_from_unit] /= lengths[is_far_from_unit, None]
+    return normals
+
+
+def _node(node: Any) -> dict[str, Any]:
+    """A node of trimesh's scene graph by names: 'frame_to', 'frame_from', 'geometry', 'matrix'. Some readers give it as
+    a tuple."""
+    return node if isinstance(node, dict) else {"frame_to": node[1], "frame_from": node[0], **node[2]}
+
+
+def _placed(nodes: list[dict[str, Any]], base: str) -> list[tuple[str, np.ndarray]]:
+    """(name of a geometry, (4, 4) matrix of its place in the file's world), node by node."""
+    parents = {node["frame_to"]: node for node in reversed(nodes)}
+    known: dict[str, np.ndarray] = {base: np.eye(4)}
+
+    def world(frame: str) -> np.ndarray:
+        # Not by recursion: a chain of nodes may be as long as the file.
+        chain = []
+        while frame not in known and frame in parents:
+            chain.append(parents[frame])
+            known[frame] = np.eye(4)  # so that a loop of nodes comes to an end
+            frame = parents[frame].get("frame_from", base)
+        matrix = known.get(frame, np.eye(4))
+        for node in reversed(chain):
+            matrix = known[node["frame_to"]] = _product(matrix, _matrix(node))
+        return matrix
+
+    return [
+        (node["geometry"], _product(world(node.get("frame_from", base)), _matrix(node)))
+        for node in nodes
+        if node.get("geometry") is not None
+    ]
+
+
+def _matrix(node: dict[str, Any]) -> np.ndarray:
+    """(4, 4): the place of a node in its parent's."""
+    matrix = node.get("matrix")
+    return np.eye(4) if matrix is None else np.asarray(matrix, np.float64).reshape(4, 4)
+
+
+def _product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """The product of two matrices. Not by BLAS, whose threads go on spinning afterwards."""
+    return np.einsum("ij,jk->ik", a, b)
+
+
+def _moved(piece: Piece, matrix: np.ndarray) -> Piece:
+    """The piece moved by a (4, 4) matrix: normals by the inverse transpose, and faces turned if it mirrors."""
+    if np.array_equal(matrix, np.eye(4)):
+        return piece
+    linear = matrix[:3, :3]
+    vertices = np.einsum("ni,ki->nk", piece.vertices, linear) + matrix[:3, 3]
+    # The determinant times the inverse transpose: it exists when the inverse does not.
+    cofactors = np.cross(linear[[1, 2, 0]], linear[[2, 0, 1]])
+    mirrors = float((linear[0] * cofactors[0]).sum()) < 0.0
+    normals = piece.normals
+    if normals is not None:
+        normals = _stored_normals(np.einsum("ni,ki->nk", normals, -cofactors if mirrors else cofactors), vertices)
+    return Piece(vertices, piece.faces[:, ::-1] if mirrors else piece.faces, normals, piece.visual)
+
+
+def _split_by_texture(read: dict[str, Any]) -> dict[str, Any]:
+    """What trimesh reads of a PLY file, with texture coordinates of its triangles' corners, where it has such.
+
+    A vertex to which corners give different texture coordinates is doubled, with its normal, for each of them.
+    """
+    table = read.get("metadata", {}).get("_ply_raw", {}).get(FACES, {}).get("data")
+    names = table if isinstance(table, dict) else getattr(getattr(table, "dtype", None), "names", None) or ()
+    if table is None or CORNER_LIST not in names or read.get("faces") is None:
+        return read
+    pairs, faces = table[CORNER_LIST], np.asarray(read["faces"])
+    pairs = np.asarray(pairs["f1"] if pairs.dtype.names else pairs, np.float64)
+    if pairs.shape != (len(faces), 6) or not np.isfinite(pairs).all():
+        return read
+    corners = np.column_stack([faces.reshape(-1), pairs.reshape(-1, 2)]).astype(np.float64)
+    firsts = first_of_equals(corners)
+    if firsts is None:
+        firsts = np.arange(len(corners))
+    chosen, numbers = np.unique(firsts, return_inverse=True)
+    result = {**read, "faces": numbers.reshape(faces.shape)}
+    for name in ("vertices", "vertex_normals"):
+        if read.get(name) is not None:
+            result[name] = np.asarray(read[name])[faces.reshape(-1)[chosen]]
+    material = getattr(read.get("visual"), "material", None)
+    result["visual"] = trimesh.visual.TextureVisuals(uv=corners[chosen, 1:], material=material)
+    return result
