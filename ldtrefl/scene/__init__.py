@@ -1,4 +1,12 @@
 """What a scene file says: camera, environment, lights and objects, their meshes and materials, and procedural shapes.
 
-Imports ``base``, ``files``, ``device`` and ``geometry``. Start with ``description.py``; ``readers/`` reads mesh files.
+    description.py      the dataclasses of a scene; load.py reads them from a file, toml_text.py the TOML in it
+    placement.py        where an object stands
+    mesh.py             a triangle mesh, checked; mesh_arrays.py goes over its arrays
+    normals.py          vertex normals, with welding.py and two_sided.py
+    outliers.py         the few triangles far outside a mesh's bulk
+    shapes/             procedural meshes, one a file
+    readers/            mesh files in many formats
+
+Imports ``base``, ``files``, ``device`` and ``geometry``. Start with ``description.py``.
 """

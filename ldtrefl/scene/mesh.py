@@ -16,12 +16,12 @@ from numpy.typing import ArrayLike
 from ldtrefl.base.errors import InputError
 from ldtrefl.files.content_key import content_key
 from ldtrefl.files.stored_picture import StoredPicture
-from ldtrefl.scene.bulk import split_outliers
-from ldtrefl.scene.mesh_passes import copied_faces, copied_vertices, fitted_vertices, is_constant
+from ldtrefl.scene.mesh_arrays import copied_faces, copied_vertices, fitted_vertices, is_immutable
 from ldtrefl.scene.normals import vertex_normals
+from ldtrefl.scene.outliers import split_outliers
 
 MAX_TRIANGLES = 1 << 30
-"""Triangle numbers are int32 and a fragment keeps one bit of it for the facing."""
+"""Triangles are numbered by int32, of which a fragment needs one bit for the way that its triangle faces."""
 
 MOST_VERTICES = (1 << 31) - 1
 """Vertices are numbered by int32."""
@@ -29,7 +29,7 @@ MOST_VERTICES = (1 << 31) - 1
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A run of triangles with one look: a material of the mesh's file."""
+    """A run of triangles with one colour and texture: a material of the mesh's file."""
 
     first_triangle: int = 0
     color: tuple[float, float, float] = (1.0, 1.0, 1.0)
@@ -44,10 +44,10 @@ class Part:
 
 
 class Mesh:
-    """A checked triangle mesh. Its arrays are read-only: what is made of them is kept.
+    """A checked triangle mesh. Its arrays are read-only, since what is derived from them is stored.
 
-    They are copies of those given. Only an array of the right type that is read-only, as is all that it is a view of,
-    is taken as it is: such as another mesh's.
+    They are copies of those given. An array is taken without a copy only if it has the right type and is read-only, as
+    is all that it is a view of: another mesh's arrays are.
 
     Raises:
         InputError: no triangles, an index out of range, a vertex that is not finite, or shapes that do not fit.
@@ -68,14 +68,14 @@ class Mesh:
         if len(corners) == 0:
             raise InputError("the mesh has no triangles")
         self.faces, self.is_used, wrong = copied_faces(corners, len(given))
-        """(m, 3) int32; (n,) bool: vertices that a triangle has."""
+        """(m, 3) int32; (n,) bool, whether a triangle has the vertex."""
         if wrong is not None:
             raise InputError(
                 f"triangle {wrong} has vertices {corners[wrong].tolist()}, allowed are 0 to {len(given) - 1}"
             )
         self.vertices, self.bounds, wrong = copied_vertices(given, self.is_used)
-        """(n, 3) float64; (2, 3) float64: the lowest and highest corner of the triangles' box (unused vertices left
-        out)."""
+        """(n, 3) float64; (2, 3) float64, the lowest and highest corner of the box about the triangles. Vertices that
+        no triangle has do not count."""
         if wrong is not None:
             raise InputError(f"vertex {wrong} is not finite or too large: {given[wrong].tolist()}")
         self.stored_normals = self._of_vertices(normals, 3, "normals")
@@ -130,7 +130,7 @@ class Mesh:
 
     @property
     def outliers(self) -> np.ndarray:
-        """(k,) int32: the few triangles far outside the bulk, most often none."""
+        """(k,) int32: the numbers of the few triangles far outside the bulk, most often none (``outliers.py``)."""
         return self._split[0]
 
     @property
@@ -159,7 +159,7 @@ def _read_only(array: np.ndarray) -> np.ndarray:
 
 def _array(values: ArrayLike, dtype: type, width: int, name: str) -> np.ndarray:
     """(n, width) read-only: the values themselves if nobody changes them, or else a copy."""
-    if isinstance(values, np.ndarray) and is_constant(values, dtype):
+    if isinstance(values, np.ndarray) and is_immutable(values, dtype):
         return _shaped(np.asarray(values), width, name)
     try:
         array: np.ndarray = np.array(values, dtype, order="C")

@@ -1,9 +1,9 @@
-"""TOML that nobody has looked at: read within limits that a scene never comes near.
+"""TOML from a source that need not be trusted, read within limits that a scene never comes near.
 
-Python's reader calls itself for every bracket, keeps every beginning of a dotted key, and converts whole numbers of any
-length, so a hundred kilobytes can take gigabytes, minutes, or the stack. One pass over the text finds what is beyond
-the limits first; strings and comments are passed over as the reader passes over them. Within the limits a text takes a
-second and some 40 MiB a megabyte.
+Python's ``tomllib`` recurses at every bracket, stores every prefix of a dotted key, and converts whole numbers of any
+length: a hundred kilobytes can take gigabytes, minutes, or all of the stack. So one pass over the text looks for what
+is beyond the limits first. It skips strings and comments as the reader does. Within the limits a text takes a second
+and some 40 MiB a megabyte.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from typing import Any
 from ldtrefl.base.errors import InputError
 
 MAX_BYTES = 4 << 20
-"""Of a scene file: 16,384 objects with all their keys take three quarters of it."""
+"""The largest scene file: 16,384 objects with all their keys take three quarters of it."""
 MAX_BRACKETS = 32
 """Brackets and braces open at once."""
 MAX_DOTS = 16
@@ -58,6 +58,7 @@ def parse_toml(text: str) -> dict[str, Any]:
 
 
 def _check_limits(text: str) -> None:
+    """Raise InputError for the first thing that is beyond the limits."""
     depth = dots = 0
     for token in _TOKEN.finditer(text):
         kind = token.lastgroup

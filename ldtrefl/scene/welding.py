@@ -1,7 +1,7 @@
 """Welding: which rows of numbers are equal, bit by bit.
 
-A hash sorts the rows into chains, and along a chain they are compared: nothing is rounded, and nothing depends on the
-hash but the time.
+A hash table with chains: a row's hash says which chain it belongs to, and along the chain rows are compared. Nothing is
+rounded. Only the time depends on the hash.
 """
 
 from __future__ import annotations
@@ -33,8 +33,9 @@ def find_firsts(
     # Out:
     chains_out: wp.array(dtype=wp.int32),  # first row of each chain of different rows
     next_out: wp.array(dtype=wp.int32),  # the next row of its chain
-    firsts_out: wp.array(dtype=wp.int32),
+    firsts_out: wp.array(dtype=wp.int32),  # the first row that is equal to each
 ):
+    """Find the first row equal to one row in its chain, or else add it to the chain. Rows are taken in order."""
     i = first + wp.tid()
     hashed = seed
     for j in range(keys.shape[1]):

@@ -1,4 +1,4 @@
-"""The few triangles far outside a mesh's bulk (``bulk.py``), in float64: tested one by one.
+"""The few triangles far outside a mesh's bulk (``scene/outliers.py``), in float64: tested one by one.
 
 A corner a million sizes away is rounded by a tenth of a size in float32, and with it the plane where it passes the
 bulk. So these triangles keep the mesh's own float64 corners. Boxes about them in float32, eight at a time, tell which a

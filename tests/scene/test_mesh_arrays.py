@@ -8,7 +8,7 @@ import pytest
 import ldtrefl
 from ldtrefl.device import launch
 from ldtrefl.scene.mesh import MOST_VERTICES
-from ldtrefl.scene.mesh_passes import RUN, RUNS
+from ldtrefl.scene.mesh_arrays import RUN, RUNS
 from ldtrefl.world.device_mesh import DeviceMesh
 
 BLOCK = int(RUN * RUNS)

@@ -1,11 +1,13 @@
-"""The passes over a mesh's arrays. Each is one kernel on all cores that reads what is given once.
+"""A mesh's arrays: checked, copied, and brought to the unit cube. Each pass is one kernel on all cores that reads its
+input once.
 
     faces    -> in range?             -> int32, and which vertices they use
     vertices -> finite and not large? -> float64, and the box about those in use
     vertices -> the unit cube, float32
 
-What is given may have any strides. It is copied, unless it is of the right type and read-only (:func:`is_constant`).
-Where something is wrong, the first place of it is told, and what was copied is not to be used.
+Arrays may have any strides. They are copied, unless they are of the right type and nobody can change them
+(:func:`is_immutable`). Where something is wrong, the number of the first wrong triangle or vertex is returned, and the
+copy is not to be used.
 """
 
 from typing import Any
@@ -20,15 +22,16 @@ LARGEST_COORDINATE = 1e100
 """Sizes and their squares stay finite in float64."""
 
 LARGEST_UNIT = 1e30
-"""Of unit coordinates, which become float32: squares of what lies so far out are infinite all the same."""
+"""Largest unit coordinate, since they become float32. What lies farther out is put here: squares of either are infinite
+in float32."""
 
 RUN = wp.constant(1024)
 RUNS = wp.constant(4)
-"""A kernel's item is a block of so many runs of so many triangles or vertices. Where little is done with each, the runs
-are gone through abreast: along a single one the processor waits for memory half of the time."""
+"""A thread of a kernel takes a block of ``RUNS`` runs of ``RUN`` triangles or vertices each. Where little is done with
+each, it goes through the runs side by side: along a single one the processor waits for memory half of the time."""
 
 NONE = wp.constant((1 << 31) - 1)
-"""In place of the first wrong item of a block in which nothing is wrong."""
+"""Written as the first wrong triangle or vertex of a block in which none is wrong."""
 
 FIRST_LOW = wp.constant(wp.float64(np.inf))
 """The low side of a box about nothing; its high side is the negative."""
@@ -44,7 +47,7 @@ def is_index(number: wp.int64, count: wp.int64) -> bool:
 
 
 @launch.once
-def faces_kernel(index: Any) -> wp.Kernel:
+def faces_kernel(index: type) -> wp.Kernel:
     """The kernel that checks and copies faces of the Warp type ``index``."""
 
     @launch.kernel
@@ -55,9 +58,10 @@ def faces_kernel(index: Any) -> wp.Kernel:
         vertices: wp.int64,  # how many there are
         # Out:
         faces_out: wp.array(dtype=wp.vec3i),  # empty if the faces are not to be copied
-        used_out: wp.array(dtype=wp.uint8),  # of vertices, 0 before; two items may write one place, and both write 1
+        used_out: wp.array(dtype=wp.uint8),  # per vertex, 0 before; two threads may write one, and both write 1
         wrong_out: wp.array(dtype=wp.int32),  # per block: its first triangle with an index out of range
     ):
+        """Check and copy the triangles of one block, and mark their vertices."""
         block = first + wp.tid()
         copies = faces_out.shape[0] > 0
         wrong = int(NONE)
@@ -82,7 +86,7 @@ def faces_kernel(index: Any) -> wp.Kernel:
 
 
 @launch.once
-def vertices_kernel(coordinate: Any) -> wp.Kernel:
+def vertices_kernel(coordinate: type) -> wp.Kernel:
     """The kernel that checks and copies vertices of the Warp type ``coordinate``."""
 
     @launch.kernel
@@ -97,6 +101,7 @@ def vertices_kernel(coordinate: Any) -> wp.Kernel:
         high_out: wp.array(dtype=wp.vec3d),
         wrong_out: wp.array(dtype=wp.int32),  # per block: its first vertex that is not finite or too large
     ):
+        """Check and copy the vertices of one block, and find the box about those in use."""
         block = first + wp.tid()
         copies = vertices_out.shape[0] > 0
         wrong = int(NONE)
@@ -130,6 +135,7 @@ def fit_vertices(
     # Out:
     unit_out: wp.array(dtype=wp.vec3),
 ):
+    """Bring the vertices of one block to the unit cube."""
     block = first + wp.tid()
     farthest = wp.vec3d(FARTHEST_UNIT)
     for k in range(RUN):
@@ -150,15 +156,15 @@ def copied_faces(given: np.ndarray, vertices: int) -> tuple[np.ndarray, np.ndarr
     Returns:
         (m, 3) int32; (vertices,) bool, which vertices they use; the first triangle with an index out of range.
     """
-    is_shared = is_constant(given, np.int32)
+    is_shared = is_immutable(given, np.int32)
     faces = given if is_shared else np.empty(given.shape, np.int32)
     used = np.zeros(vertices, np.uint8)
     blocks, cpu = _block_count(len(given)), launch.resolve_device("cpu")
     wrong = np.empty(blocks, np.int32)
     index = wp.int32 if given.dtype == np.int32 else wp.int64
-    copies = _seen(faces[:0] if is_shared else faces, wp.vec3i, cpu)
-    outputs = [copies, _seen(used, wp.uint8, cpu), _seen(wrong, wp.int32, cpu)]
-    launch.launch(faces_kernel(index), blocks, [_seen(given, index, cpu), wp.int64(vertices), *outputs], cpu)
+    copies = _as_warp(faces[:0] if is_shared else faces, wp.vec3i, cpu)
+    outputs = [copies, _as_warp(used, wp.uint8, cpu), _as_warp(wrong, wp.int32, cpu)]
+    launch.launch(faces_kernel(index), blocks, [_as_warp(given, index, cpu), wp.int64(vertices), *outputs], cpu)
     return faces, used.view(bool), _first_of(wrong)
 
 
@@ -173,14 +179,14 @@ def copied_vertices(given: np.ndarray, is_used: np.ndarray) -> tuple[np.ndarray,
         (n, 3) float64; (2, 3) float64, the lowest and highest corner of the box about those in use; the first vertex
         that is not finite or too large.
     """
-    is_shared = is_constant(given, np.float64)
+    is_shared = is_immutable(given, np.float64)
     vertices = given if is_shared else np.empty(given.shape, np.float64)
     blocks, cpu = _block_count(len(given)), launch.resolve_device("cpu")
     low, high, wrong = np.empty((blocks, 3)), np.empty((blocks, 3)), np.empty(blocks, np.int32)
     coordinate = wp.float64 if given.dtype == np.float64 else wp.float32
-    inputs = [_seen(given, coordinate, cpu), _seen(is_used.view(np.uint8), wp.uint8, cpu)]
-    copies = _seen(vertices[:0] if is_shared else vertices, wp.vec3d, cpu)
-    outputs = [copies, _seen(low, wp.vec3d, cpu), _seen(high, wp.vec3d, cpu), _seen(wrong, wp.int32, cpu)]
+    inputs = [_as_warp(given, coordinate, cpu), _as_warp(is_used.view(np.uint8), wp.uint8, cpu)]
+    copies = _as_warp(vertices[:0] if is_shared else vertices, wp.vec3d, cpu)
+    outputs = [copies, _as_warp(low, wp.vec3d, cpu), _as_warp(high, wp.vec3d, cpu), _as_warp(wrong, wp.int32, cpu)]
     launch.launch(vertices_kernel(coordinate), blocks, [*inputs, *outputs], cpu)
     return vertices, np.stack([low.min(axis=0), high.max(axis=0)]), _first_of(wrong)
 
@@ -188,12 +194,12 @@ def copied_vertices(given: np.ndarray, is_used: np.ndarray) -> tuple[np.ndarray,
 def fitted_vertices(vertices: np.ndarray, centre: np.ndarray, half: float) -> np.ndarray:
     """(n, 3) float32: ``(vertices - centre) / half`` of (n, 3) float64, in float64, within float32's range."""
     unit, cpu = np.empty(vertices.shape, np.float32), launch.resolve_device("cpu")
-    inputs = [_seen(vertices, wp.vec3d, cpu), wp.vec3d(*centre), wp.float64(half)]
-    launch.launch(fit_vertices, _block_count(len(vertices)), [*inputs, _seen(unit, wp.vec3, cpu)], cpu)
+    inputs = [_as_warp(vertices, wp.vec3d, cpu), wp.vec3d(*centre), wp.float64(half)]
+    launch.launch(fit_vertices, _block_count(len(vertices)), [*inputs, _as_warp(unit, wp.vec3, cpu)], cpu)
     return unit
 
 
-def is_constant(array: np.ndarray, dtype: type) -> bool:
+def is_immutable(array: np.ndarray, dtype: type) -> bool:
     """Whether an array is of this type, lies in C order, and is read-only, as is all that it is a view of.
 
     Memory that is not numpy's own may change all the same: a file that is mapped, another library's array.
@@ -212,8 +218,8 @@ def _block_count(items: int) -> int:
     return -(-items // int(RUN * RUNS))
 
 
-def _seen(array: np.ndarray, dtype: Any, cpu: wp.Device) -> wp.array:
-    """A numpy array as kernels see it: where it lies."""
+def _as_warp(array: np.ndarray, dtype: type, cpu: wp.Device) -> wp.array:
+    """A numpy array as kernels read and write it, where it lies."""
     return wp.array(array, dtype=dtype, device=cpu, copy=False)
 
 

@@ -1,8 +1,8 @@
-"""Where nearly all of a mesh is, when a few triangles lie far outside: a lone vertex, dust, a ground without end.
+"""The few triangles that lie far outside a mesh's bulk: a stray vertex, dust, a ground without end.
 
-Float32 resolves a ten-millionth of the unit cube. A mesh whose few outermost triangles make its box a thousand times
-larger would be resolved to a thousandth of what people look at, so the unit cube is put about the bulk alone. What lies
-outside is few enough to be tested in float64 (``outliers.py``).
+Float32 resolves a ten-millionth of the unit cube. If a few outliers make a mesh's box a thousand times larger, what
+people look at would be resolved a thousand times more coarsely. So the unit cube is put about the *bulk*, which is the
+mesh without its outliers. These are few enough to be tested one by one in float64 (``world/outliers.py``).
 """
 
 from __future__ import annotations
@@ -15,23 +15,24 @@ from ldtrefl.device.bins import CHUNK, chunk_count, launch_chunks
 from ldtrefl.geometry.vectors import high_side, low_side
 
 SAMPLES = 1024
-"""Triangles that are looked at to see how far the bulk reaches."""
+"""Triangles, evenly chosen, whose first corners tell how far the bulk reaches."""
 
 TAIL = 0.05
 """Share of the samples left out at either end along each axis."""
 
 FAR_LARGER = 32.0
-"""Times that the whole box must be longer than the samples' for outliers to be told apart: float32 then still resolves
-four millionths of the bulk without."""
+"""The mesh's box must be this many times as long as the samples' for the mesh to have outliers. Below it float32
+resolves at least four millionths of the bulk all the same."""
 
 FARTHEST = 1e12
-"""Times from which the bulk is too small to be seen beside its outliers: a coordinate is damaged."""
+"""If the mesh's box is this many times as long, the bulk is too small to be seen beside its outliers: a coordinate is
+damaged, and the mesh counts as one without outliers."""
 
 REACH = 2.0
-"""Of the samples' longest side, how far from their middle the bulk may go on along each axis."""
+"""How far from the samples' middle the bulk may reach along each axis, in lengths of their box's longest side."""
 
 MOST_OUTLIERS = 64
-"""Triangles outside the bulk up to which they are tested one by one. With more the mesh has no bulk."""
+"""The most outliers that a mesh may have, since they are tested one by one. With more triangles outside it has none."""
 
 NOWHERE = wp.constant(wp.float64(np.inf))
 """The low side of a box about nothing; its high side is the negative."""
@@ -50,6 +51,7 @@ def measure_inside(
     low_out: wp.array(dtype=wp.vec3d),  # the box about the others
     high_out: wp.array(dtype=wp.vec3d),
 ):
+    """Count the triangles of one chunk that lie outside, and find the box about the others."""
     chunk = first + wp.tid()
     begin = CHUNK * chunk
     outside = int(0)
