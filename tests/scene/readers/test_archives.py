@@ -1,0 +1,98 @@
+"""The files in archives and beside a mesh: found, and none larger than is allowed."""
+
+import bz2
+import gzip
+import io
+import os
+import tarfile
+import zipfile
+from pathlib import Path
+
+import pytest
+import trimesh
+
+import ldtrefl
+from ldtrefl import InputError
+from ldtrefl.base import budget
+
+
+def packed(path: Path, name: str, data: bytes) -> Path:
+    if path.suffix == ".zip":
+        with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+            archive.writestr("readme.txt", "no mesh")
+            archive.writestr(name, data)
+    elif ".tar" in path.name:
+        with tarfile.open(path, "w:gz" if path.suffix == ".gz" else "w:bz2") as archive:
+            entry = tarfile.TarInfo(name)
+            entry.size = len(data)
+            archive.addfile(entry, io.BytesIO(data))
+    else:
+        path.write_bytes(bz2.compress(data))
+    return path
+
+
+ARCHIVES = ("a.zip", "a.tar.gz", "a.tar.bz2", "a.stl.bz2")
+
+
+@pytest.mark.parametrize("name", ARCHIVES)
+def test_meshes_in_archives(tmp_path: Path, name: str) -> None:
+    ball = trimesh.creation.icosphere(2).export(file_type="stl")
+    assert len(ldtrefl.load_mesh(packed(tmp_path / name, "a.stl", ball)).faces) == 320
+
+
+@pytest.mark.parametrize("name", ARCHIVES)
+def test_archives_that_unpack_to_too_much_are_refused(tmp_path: Path, name: str) -> None:
+    path = packed(tmp_path / name, "a.stl", bytes(80) + (8 << 20).to_bytes(4, "little") + bytes(400 << 20))
+    assert path.stat().st_size < 1 << 20
+    with pytest.raises(ldtrefl.InputError, match=rf"{name}.*GiB"):
+        ldtrefl.load_mesh(path)
+    budget.set_memory_limit(64 << 20)
+    with pytest.raises(ldtrefl.InputError, match=rf"{name}: what the archive holds needs .* allowed are 64.0 MiB"):
+        ldtrefl.load_mesh(path)
+
+
+def test_an_archive_whose_headers_lie_is_refused(tmp_path: Path) -> None:
+    """A zip that declares less than it holds, and a tar file whose member has more zeros than it stores."""
+    path = packed(tmp_path / "a.zip", "a.stl", bytes(64 << 20))
+    data = bytearray(path.read_bytes())
+    for place in range(len(data) - 4):
+        if data[place : place + 4] == (64 << 20).to_bytes(4, "little"):
+            data[place : place + 4] = (100).to_bytes(4, "little")
+    path.write_bytes(data)
+    with pytest.raises(ldtrefl.InputError, match=r"a\.zip"):
+        ldtrefl.load_mesh(path)
+    sparse = tarfile.TarInfo("a.stl")
+    sparse.size = 512
+    told = {"major": "1", "minor": "0", "name": "a.stl", "realsize": str(1 << 40)}
+    sparse.pax_headers = {f"GNU.sparse.{key}": value for key, value in told.items()}
+    whole = io.BytesIO()
+    with tarfile.open(fileobj=whole, mode="w", format=tarfile.PAX_FORMAT) as archive:
+        archive.addfile(sparse, io.BytesIO(b"0\n".ljust(512, b"\0")))
+    (tmp_path / "a.tar.gz").write_bytes(gzip.compress(whole.getvalue()))
+    with pytest.raises(ldtrefl.InputError, match=r"a\.tar\.gz.*1024\.0 GiB"):
+        ldtrefl.load_mesh(tmp_path / "a.tar.gz")
+
+
+@pytest.mark.parametrize("name", ["a.zip", "a.tar.gz"])
+def test_archives_of_other_things(tmp_path: Path, name: str) -> None:
+    with pytest.raises(ldtrefl.InputError, match="no mesh file in the archive"):
+        ldtrefl.load_mesh(packed(tmp_path / name, "a.txt", b"words"))
+    with pytest.raises(ldtrefl.InputError, match=name):
+        ldtrefl.load_mesh(packed(tmp_path / name, "a.ply", b"ply\nno"))
+    (tmp_path / name).write_bytes(b"not an archive")
+    with pytest.raises(ldtrefl.InputError, match=name):
+        ldtrefl.load_mesh(tmp_path / name)
+
+
+def test_files_beside_a_mesh_are_plain_files(tmp_path: Path) -> None:
+    """A pipe, a folder or a device in place of a glTF's buffer is a line, and nobody waits for a writer."""
+    trimesh.creation.icosphere(1).export(tmp_path / "ball.gltf")
+    buffer = next(path for path in tmp_path.iterdir() if path.suffix == ".bin")
+    buffer.unlink()
+    os.mkfifo(buffer)
+    with pytest.raises(InputError, match=rf"ball\.gltf: .*'{buffer.name}' beside it is not a file"):
+        ldtrefl.load_mesh(tmp_path / "ball.gltf")
+    buffer.unlink()
+    buffer.mkdir()
+    with pytest.raises(InputError, match=rf"ball\.gltf: .*'{buffer.name}' beside it is not a file"):
+        ldtrefl.load_mesh(tmp_path / "ball.gltf")

@@ -1,0 +1,59 @@
+"""Colours and textures: upright, and each part its own."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from PIL import Image
+
+import ldtrefl
+from ldtrefl.scene.description import Camera, Environment, Lighting, Material, Object, Scene
+
+
+def quadrants(tmp_path: Path) -> Path:
+    """A picture: red and green on top, blue and white below."""
+    picture = np.zeros((64, 64, 3), np.uint8)
+    picture[:32, :32], picture[:32, 32:] = (255, 0, 0), (0, 255, 0)
+    picture[32:, :32], picture[32:, 32:] = (0, 0, 255), (255, 255, 255)
+    Image.fromarray(picture).save(tmp_path / "quadrants.png")
+    return tmp_path / "quadrants.png"
+
+
+@pytest.mark.parametrize("method", ["bvh", "ldt"])
+def test_textures_are_upright_directly_and_mirrored(tmp_path: Path, method: str) -> None:
+    texture = str(quadrants(tmp_path))
+    camera = Camera(eye=(0, 0, 5), look_at=(0, 0, 0), up=(0, 1, 0), width=32, height=32, fov_y=10)
+    lit = Lighting(ambient=(1, 1, 1))
+    sheet = Object(shape="plane", material=Material(albedo=(1, 1, 1), texture=texture))
+    direct = ldtrefl.render(Scene(camera=camera, lighting=lit, objects=(sheet,)), method).image
+    corners = [direct[4, 4], direct[4, 27], direct[27, 4], direct[27, 27]]
+    np.testing.assert_allclose(corners, [[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]], atol=1e-3)
+
+    # Seen in a mirror behind the camera's target, the sheet facing the mirror: left and right exchanged.
+    mirror = Object(shape="plane", scale=3.0, material=Material(albedo=(0, 0, 0), mirror=(1, 1, 1)))
+    sheet = Object(
+        shape="plane", scale=2.0, rotate=(0, 1, 0, 180), translate=(0, 0, 8), material=sheet.material, smooth=False
+    )
+    scene = Scene(camera=camera, lighting=lit, environment=Environment(), objects=(mirror, sheet))
+    reflected = ldtrefl.render(scene, method).reflection
+    # Turned by 180 degrees about y the sheet's left is at +x; the mirror shows it where it is.
+    corners = [reflected[4, 27], reflected[4, 4], reflected[27, 27], reflected[27, 4]]
+    np.testing.assert_allclose(corners, [[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]], atol=1e-2)
+
+
+def test_parts_keep_their_own_colours_and_textures(tmp_path: Path) -> None:
+    def sheet(x: float, color: tuple[int, int, int]) -> trimesh.Trimesh:
+        corners = [[x, 0, 0], [x + 1, 0, 0], [x + 1, 1, 0], [x, 1, 0]]
+        uv = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)
+        material = trimesh.visual.material.PBRMaterial(baseColorTexture=Image.new("RGB", (2, 2), color))
+        visual = trimesh.visual.TextureVisuals(uv=uv, material=material)
+        return trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 3]], visual=visual, process=False)
+
+    pieces = [sheet(-1.0, (255, 0, 0)), sheet(0.0, (0, 0, 255))]
+    trimesh.Scene(pieces).export(tmp_path / "two.glb")
+    camera = Camera(eye=(0, 0.5, 5), look_at=(0, 0.5, 0), up=(0, 1, 0), width=16, height=8, fov_y=8)
+    thing = Object(mesh=str(tmp_path / "two.glb"), material=Material(albedo=(1, 1, 1)))
+    image = ldtrefl.render(Scene(camera=camera, lighting=Lighting(ambient=(1, 1, 1)), objects=(thing,))).image
+    np.testing.assert_allclose(image[4, 2], [1, 0, 0], atol=1e-3)
+    np.testing.assert_allclose(image[4, 13], [0, 0, 1], atol=1e-3)
