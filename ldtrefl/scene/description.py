@@ -305,7 +305,7 @@ class Scene:
 
     def _laid_out_alike(self, other: Scene) -> Scene:
         """A scene that comes from this one, with its ``layout_box``."""
-        vars(other)["layout_box"] = self.layout_box
+        object.__setattr__(other, "layout_box", self.layout_box)
         return other
 
     def with_camera(self, camera: Camera) -> Scene:

@@ -1,4 +1,12 @@
 """The scene on the device: meshes, placed objects, materials, lights and the camera, as kernels read them.
 
+    device_scene.py     all of it
+    records.py          the structs that kernels read, and the three spaces
+    device_space.py     device space; device_object.py places an object in it
+    device_mesh.py      a mesh's arrays; outliers.py its triangles that are tested in float64
+    appearance.py       colours and textures; lighting.py lights and environment
+    camera.py           the camera as kernels see it
+    unit_rays.py        rays in an object's own space
+
 Imports ``scene`` and what is below it. Start with ``device_scene.py``.
 """

@@ -32,6 +32,7 @@ class DeviceObject:
     world_from_unit: np.ndarray
     """(4, 4) float64."""
     record: ObjectRecord
+    """What kernels read of it."""
 
     @property
     def vertex_count(self) -> int:

@@ -23,13 +23,22 @@ from ldtrefl.world.lighting import lighting_of
 from ldtrefl.world.records import LightingRecord, ObjectRecord
 
 MOST_NUMBERS = (1 << 31) - 1
-"""Triangles and vertices of all objects together: they are numbered by int32."""
+"""The most triangles, and vertices, that all objects may have together: they are numbered by int32."""
 
 
 class DeviceScene:
-    """A scene uploaded to a device; what is the same as ``before`` is taken over.
+    """A scene on a device.
 
-    Without ``skip_attributes`` normals and texture coordinates are uploaded even where shading does not use them.
+    Args:
+        scene: what is uploaded.
+        device: where to.
+        before: a scene on the same device from which ``scene`` was made by changing objects
+            (:meth:`Scene.with_object`). Meshes, the environment's picture and objects that stand where they stood are
+            taken over from it.
+        skip_attributes: leave out normals and texture coordinates that shading does not read.
+
+    Raises:
+        InputError: a mesh, texture or picture cannot be read, or there are too many triangles, vertices or texels.
     """
 
     def __init__(
@@ -84,7 +93,7 @@ class DeviceScene:
 
     @property
     def device_units_per_world_unit(self) -> float:
-        """Scale of device space."""
+        """How long a world unit is in device space."""
         return float(self.device_from_world[0, 0])
 
     @property
@@ -94,7 +103,7 @@ class DeviceScene:
 
     @functools.cached_property
     def reflector_rows(self) -> tuple[wp.array, int]:
-        """(objects,) int32, first of a reflector's triangles among those of all reflectors; and how many there are."""
+        """((objects,) int32, the number of a reflector's triangle 0 among all reflectors' triangles; their count)."""
         counts = [len(entry.geometry.faces) if entry.source.is_reflector else 0 for entry in self.objects]
         firsts = np.cumsum([0, *counts])
         return wp.array(firsts[:-1].astype(np.int32), dtype=wp.int32, device=self.device), int(firsts[-1])

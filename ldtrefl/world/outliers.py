@@ -1,13 +1,11 @@
-"""The few triangles far outside a mesh's bulk (``scene/outliers.py``), in float64: tested one by one.
+"""The few triangles far outside a mesh's bulk (``scene/outliers.py``) on a device, in float64.
 
-A corner a million sizes away is rounded by a tenth of a size in float32, and with it the plane where it passes the
-bulk. So these triangles keep the mesh's own float64 corners. Boxes about them in float32, eight at a time, tell which a
-ray may meet.
+A corner that is a million of the bulk's sizes away is rounded by a tenth of its size in float32. So is then the
+triangle's plane where it passes the bulk. So outliers keep the mesh's own float64 corners and are tested one by one.
+Boxes about them in float32, tested eight at a time, tell which a ray may meet.
 """
 
 from __future__ import annotations
-
-from typing import Any
 
 import numpy as np
 import warp as wp
@@ -17,28 +15,28 @@ from ldtrefl.scene.mesh import Mesh
 
 @wp.struct
 class OutlierTriangle:
-    """A triangle in unit space."""
+    """An outlier, in unit space."""
 
     a: wp.vec3d
     edge_u: wp.vec3d  # from a to b
     edge_v: wp.vec3d  # from a to c
-    triangle: int
+    triangle: int  # its number in the mesh
 
 
 @wp.struct
 class Outliers:
-    """All of a mesh."""
+    """All outliers of a mesh."""
 
     triangles: wp.array(dtype=OutlierTriangle)
-    boxes: wp.array(dtype=wp.float32)  # of eight each: per axis their lows, then their highs
+    boxes: wp.array(dtype=wp.float32)  # for each eight triangles 48: per axis eight low sides, then eight high sides
 
 
 BOX_MARGIN = 1.0e-6
-"""Of the largest coordinate, by how much boxes, and a ray's start, are widened: some roundings of a float32."""
+"""How much boxes, and a ray's start, are widened, as a share of the largest coordinate: some roundings of a float32."""
 
 
-def outliers_of(mesh: Mesh, device: wp.Device) -> Any:
-    """The ``Outliers`` of a mesh, on a device."""
+def outliers_of(mesh: Mesh, device: wp.Device) -> Outliers:
+    """Upload the outliers of a mesh, most often none."""
     made = Outliers()
     if len(mesh.outliers) == 0:
         made.triangles = wp.empty(0, dtype=OutlierTriangle, device=device)

@@ -16,9 +16,9 @@ class ObjectRecord:
     """An object: its mesh, place and material."""
 
     vertices: wp.array(dtype=wp.vec3)  # unit space
-    exact_vertices: wp.array(dtype=wp.vec3d)  # the same in float64 if some lie far outside the bulk, else empty
-    normals: wp.array(dtype=wp.vec3)  # unit space, not always of unit length, zero where undefined
-    uvs: wp.array(dtype=wp.vec2)  # empty without texture coordinates
+    exact_vertices: wp.array(dtype=wp.vec3d)  # the same in float64 if the mesh has outliers, else empty
+    normals: wp.array(dtype=wp.vec3)  # unit space, not always of unit length, zero where undefined; empty if unused
+    uvs: wp.array(dtype=wp.vec2)  # texture coordinates, v = 0 at the bottom; empty if the mesh has none, or unused
     faces: wp.array(dtype=wp.vec3i)
     device_from_unit: wp.mat44d
     unit_from_device: wp.mat44d
@@ -26,20 +26,20 @@ class ObjectRecord:
     unit_per_device: float  # a power of two, so that squares stay in float32's range however small the object is
     normal_from_unit: wp.mat33  # inverse transpose of device_from_unit's linear part
     centre: wp.vec3d  # bounding sphere, device space
-    radius: float
+    radius: float  # of that sphere, device units
     first_triangle: int  # number of triangle 0 among all objects' triangles
-    first_vertex: int  # and of vertex 0 among all objects' vertices
+    first_vertex: int  # number of vertex 0 among all objects' vertices
     triangle_count: int
-    smooth: int
-    fresnel: int
+    smooth: int  # 1 for interpolated shading normals, 0 for the facets'
+    fresnel: int  # 1 for Schlick's approximation
     albedo: wp.vec3
-    emission: wp.vec3
-    mirror: wp.vec3
+    emission: wp.vec3  # radiance
+    mirror: wp.vec3  # specular reflectance
     part_first: wp.array(dtype=wp.int32)  # first triangle of each part
-    part_color: wp.array(dtype=wp.vec3)
+    part_color: wp.array(dtype=wp.vec3)  # linear, times albedo
     part_texture: wp.array(dtype=wp.vec4i)  # first texel, width, height, 1 for bytes; width 0 without a texture
-    texels: wp.array(dtype=wp.vec3)  # all parts' textures of floats, row 0 at v = 1
-    texel_bytes: wp.array(dtype=wp.vec3ub)  # and those of 8 bits, sRGB
+    texels: wp.array(dtype=wp.vec3)  # all parts' textures of floats, linear, row 0 at v = 1
+    texel_bytes: wp.array(dtype=wp.vec3ub)  # all parts' textures of 8 bits, sRGB, row 0 at v = 1
     decoded: wp.array(dtype=float)  # the linear value of every byte
 
 
@@ -47,10 +47,10 @@ class ObjectRecord:
 class LightRecord:
     """A light in device space."""
 
-    is_point: int
-    towards: wp.vec3  # of a directional one, unit
-    position: wp.vec3d  # of a point light
-    radiance: wp.vec3  # point: intensity in device units
+    is_point: int  # 1 for a point light, 0 for a directional one
+    towards: wp.vec3  # directional: the way to the light, unit
+    position: wp.vec3d  # point: where it is
+    radiance: wp.vec3  # directional: as in the scene; point: intensity in device units
 
 
 @wp.struct
@@ -58,12 +58,12 @@ class LightingRecord:
     """Lights and environment."""
 
     lights: wp.array(dtype=LightRecord)
-    ambient: wp.vec3
-    sky: wp.vec3
-    ground: wp.vec3
-    up: wp.vec3  # unit
+    ambient: wp.vec3  # added irradiance / pi
+    sky: wp.vec3  # radiance straight up
+    ground: wp.vec3  # radiance straight down
+    up: wp.vec3  # the camera's, unit
     image_size: wp.vec2i  # rows and columns of the equirectangular picture; 0 without one
-    image: wp.array2d(dtype=wp.vec3)  # its pixels if they are floats
-    image_bytes: wp.array2d(dtype=wp.vec3ub)  # and if they have 8 bits, sRGB; the other one is empty
+    image: wp.array2d(dtype=wp.vec3)  # its pixels if they are floats, linear; else empty
+    image_bytes: wp.array2d(dtype=wp.vec3ub)  # its pixels if they have 8 bits, sRGB; else empty
     decoded: wp.array(dtype=float)  # the linear value of every byte
-    shadows: int
+    shadows: int  # 1 if lights cast shadows

@@ -74,3 +74,8 @@ def test_a_picture_is_read_once_however_objects_move(tmp_path: Path) -> None:
     picture = scene.objects[0].texture
     (tmp_path / "a.png").unlink()
     assert scene.with_object("a", scale=2.0).objects[0].texture is picture is not None
+
+
+def test_the_corners_of_a_turned_box_are_its_own() -> None:
+    corners = Object(shape="plane", rotate=(0, 0, 1, 45.0)).world_corners()
+    assert np.abs(corners).max() == pytest.approx(np.sqrt(2.0)) and (corners[:, 2] == 0.0).all()

@@ -8,7 +8,12 @@ import trimesh
 from PIL import Image
 
 import ldtrefl
+from ldtrefl.device import launch
+from ldtrefl.files.stored_picture import StoredPicture
+from ldtrefl.scene import shapes
 from ldtrefl.scene.description import Camera, Environment, Lighting, Material, Object, Scene
+from ldtrefl.scene.mesh import Mesh, Part
+from ldtrefl.world.appearance import appearance_of
 
 
 def quadrants(tmp_path: Path) -> Path:
@@ -57,3 +62,25 @@ def test_parts_keep_their_own_colours_and_textures(tmp_path: Path) -> None:
     image = ldtrefl.render(Scene(camera=camera, lighting=Lighting(ambient=(1, 1, 1)), objects=(thing,))).image
     np.testing.assert_allclose(image[4, 2], [1, 0, 0], atol=1e-3)
     np.testing.assert_allclose(image[4, 13], [0, 0, 1], atol=1e-3)
+
+
+def test_textures_are_uploaded_once_and_by_kind() -> None:
+    """Two parts share a picture of bytes, one has floats, one has none."""
+    plane = shapes.make("plane", {"segments": 2})
+    pixels = np.arange(18, dtype=np.uint8).reshape(2, 3, 3)
+    first, alike = StoredPicture(pixels), StoredPicture(pixels.copy())
+    floats = StoredPicture(np.linspace(0, 1, 12, dtype=np.float32).reshape(1, 4, 3))
+    parts = (Part(0, texture=first), Part(2, texture=floats), Part(4, texture=alike), Part(6, (0.0, 1.0, 0.0)))
+    made = appearance_of(Mesh(plane.vertices, plane.faces, None, plane.uvs, parts), None, launch.resolve_device("cpu"))
+    assert made.part_first.numpy().tolist() == [0, 2, 4, 6] and made.part_color.numpy()[3].tolist() == [0, 1, 0]
+    assert made.part_texture.numpy().tolist() == [[0, 3, 2, 1], [0, 4, 1, 0], [0, 3, 2, 1], [0, 0, 0, 0]]
+    np.testing.assert_array_equal(made.texel_bytes.numpy(), pixels.reshape(-1, 3))
+    np.testing.assert_array_equal(made.texels.numpy(), floats.pixels.reshape(-1, 3))
+
+
+def test_a_materials_texture_takes_the_place_of_all_parts_own() -> None:
+    plane = shapes.make("plane", {"segments": 2})
+    own, given = (StoredPicture(np.full((1, 1, 3), value, np.uint8)) for value in (7, 9))
+    mesh = Mesh(plane.vertices, plane.faces, None, plane.uvs, (Part(0, texture=own), Part(4)))
+    made = appearance_of(mesh, given, launch.resolve_device("cpu"))
+    assert made.texel_bytes.numpy().tolist() == [[9, 9, 9]] and (made.part_texture.numpy()[:, 1] == 1).all()
