@@ -1,4 +1,4 @@
-"""What every room needs and what knows nothing of pictures: errors of one line, the memory budget, checked values.
+"""What every room needs and what knows nothing of pictures: errors in one line, the memory budget, checked values.
 
-Imports nothing of the package. Start with ``errors.py``.
+Imports nothing of the package. Start with ``errors.py``, then ``budget.py``.
 """

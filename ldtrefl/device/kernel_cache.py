@@ -1,7 +1,7 @@
-"""Loading kernels: quietly, with a notice where one must be compiled, and whether or not Warp's cache can be written.
+"""Loading kernels without Warp's own messages, with one notice before the first is compiled.
 
 Warp keeps compiled kernels in a folder (``WARP_CACHE_PATH``, or ``warp`` in the user's cache folder). Where that cannot
-be written, kernels are compiled into a folder of this process, which is removed at its end.
+be written, kernels are compiled into a folder of this process, which is removed when the process ends.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from ldtrefl.base.errors import InputError
 from ldtrefl.base.standard_error import caught_stderr
 from ldtrefl.device import warp_abi
 
-ROOM = 4 << 20
-"""Bytes that must fit into the folder before a kernel is compiled: all kernels of a render take 1 MB. Warp's compiler
-leaves broken files where a disk is full, or ends the process."""
+ROOM_BYTES = 4 << 20
+"""Bytes that must fit into the folder before a kernel is compiled: all kernels of a render take 1 MB. On a full disk
+Warp's compiler leaves broken files or ends the process."""
 
 NOTICE = "compiling kernels for the first time, which takes up to half a minute (they are kept in {})"
 """Measured: 4 s for `peel`, 16 s for a render, twice that where another program has a core."""
@@ -33,17 +33,17 @@ _log = logging.getLogger("ldtrefl")
 
 
 class _State:
-    """What one process shares, under ``lock``."""
+    """What the process has found out and made. ``lock`` guards it."""
 
     def __init__(self) -> None:
         self.lock = threading.RLock()
-        self.loaded: set[tuple[wp.Kernel, str]] = set()
+        self.loaded: set[tuple[wp.Kernel, str]] = set()  # with the names of their devices
         self.is_started = False
-        self.is_announced = False
+        self.is_announced = False  # whether the notice, or a warning in its place, was given
         self.is_checked = False  # whether Warp's own folder has been found good or bad
-        self.own_folder: Path | None = None  # kernels go here if Warp's folder is bad
-        self.own_process = 0  # that made it, and removes it
-        self.log_level: int | None = None  # Warp's own, while it is kept quiet
+        self.own_folder: Path | None = None  # where kernels go if Warp's folder is bad
+        self.own_process = 0  # the process that made the folder and removes it
+        self.log_level: int | None = None  # Warp's level while it is kept quiet
 
 
 _state = _State()
@@ -103,11 +103,11 @@ def load(kernel: wp.Kernel, device: wp.Device) -> None:
             _log.info(NOTICE.format(_state.own_folder or wp.config.kernel_cache_dir))
         if is_compiled or _state.own_folder is None:
             try:
-                # Of a damaged file LLVM says in its own words what is wrong.
+                # Of a damaged file LLVM prints in its own words what is wrong.
                 with caught_stderr() if is_compiled else nullcontext():
                     _load(kernel, device)
             except Exception as error:
-                # A damaged file, or a folder that has become full: once more, elsewhere.
+                # A damaged file, or a folder that has become full: compile once more, elsewhere.
                 if not is_compiled and not isinstance(error, OSError) and _has_room(wp.config.kernel_cache_dir):
                     raise
                 warp_abi.forget_failure(kernel)
@@ -125,11 +125,12 @@ def folders() -> list[Path]:
 
 
 def _load(kernel: wp.Kernel, device: wp.Device) -> None:
+    """Load a kernel from Warp's folder; Warp compiles it if it is not there."""
     wp.load_module(kernel.module, device=device, max_workers=0)
 
 
 def _load_elsewhere(kernel: wp.Kernel, device: wp.Device) -> None:
-    """Load a kernel by way of our own folder; Warp's folder is as it was afterwards."""
+    """Load a kernel from our own folder; afterwards the setting of Warp's folder is as it was."""
     before = wp.config.kernel_cache_dir
     wp.config.kernel_cache_dir = str(_state.own_folder)
     try:
@@ -150,6 +151,7 @@ def _check_folder() -> None:
 
 
 def _has_room(folder: str) -> bool:
+    """Whether a folder can take what is compiled."""
     try:
         _write_probe(Path(folder))
     except OSError:
@@ -158,20 +160,24 @@ def _has_room(folder: str) -> bool:
 
 
 def _write_probe(folder: Path) -> None:
-    """Write ``ROOM`` bytes into a file of a folder, and remove it.
+    """Write ``ROOM_BYTES`` bytes into a file of a folder, and remove it.
 
     Raises:
         OSError: they cannot be written.
     """
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryFile(dir=folder) as probe:
-        probe.write(bytes(ROOM))
+        probe.write(bytes(ROOM_BYTES))
         probe.flush()
         os.fsync(probe.fileno())
 
 
 def _compile_elsewhere(folder: str, reason: str) -> None:
-    """Make a folder of our own for kernels in place of Warp's, and say so."""
+    """Make a folder of our own for kernels in place of Warp's, and warn of it.
+
+    Raises:
+        InputError: none can be made.
+    """
     if _state.own_folder is not None:
         return
     made = None
@@ -183,7 +189,7 @@ def _compile_elsewhere(folder: str, reason: str) -> None:
             shutil.rmtree(made, ignore_errors=True)
         raise InputError(
             f"compiled kernels cannot be kept in {folder} ({reason}), nor in a temporary folder ({_reason(error)}); "
-            f"set WARP_CACHE_PATH to a folder with {ROOM >> 20} MB of room"
+            f"set WARP_CACHE_PATH to a folder with {ROOM_BYTES >> 20} MB of room"
         ) from error
     _state.own_folder, _state.own_process = made, os.getpid()
     atexit.register(_remove, made, _state.own_process)
@@ -195,20 +201,22 @@ def _compile_elsewhere(folder: str, reason: str) -> None:
 
 
 def _remove(folder: Path, process: int) -> None:
+    """Remove the folder at the end of the process that made it, and not of one that was forked from that."""
     if os.getpid() == process:
         shutil.rmtree(folder, ignore_errors=True)
 
 
 def _reason(error: Exception) -> str:
+    """What an error says, in one line."""
     words = error.strerror if isinstance(error, OSError) and error.strerror else str(error) or type(error).__name__
     return " ".join(words.split())
 
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Have Warp say nothing short of errors inside this block: it greets and reports every kernel on standard output.
+    """Have Warp print nothing but errors inside this block: it would greet and report every kernel on standard output.
 
-    Whoever has set another level than Warp's default hears what they asked for. The lock is held by the caller.
+    Nothing is changed where the user has set another log level than Warp's default. The caller holds the lock.
     """
     if wp.config.log_level != wp.LOG_INFO:
         yield

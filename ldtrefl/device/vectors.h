@@ -1,7 +1,8 @@
 // Vectors of four and of eight floats for native code: the compiler's own where it has them, loops where it has not.
 //
-// A base class of ``TreeBuild`` (tree_build.h) and ``TreeWalk`` (tree_walk.h). All of these files are bodies of native
-// functions, where only local classes may stand: they have no templates and no static members.
+// A base class of the classes in other files of native code. All of them stand in the bodies of native functions
+// (native_sources.py), where only local classes may: they have no templates and no static members. PLAIN_VECTORS asks
+// for the loops, which CUDA takes.
 
 #if defined(__CUDA_ARCH__)
 #define PLAIN_VECTORS
@@ -87,7 +88,8 @@ struct Vectors {
         return __builtin_ctz(word);
 #endif
     }
-    SHARED bool has_few(int word) {  // bits: at most two
+    // Whether at most two bits are set.
+    SHARED bool has_few(int word) {
         word &= word - 1;
         return !(word & (word - 1));
     }
@@ -108,7 +110,8 @@ struct Vectors {
     SHARED Eight lesser(Eight a, Eight b) { return chosen(a < b, a, b); }
     SHARED Eight greater(Eight a, Eight b) { return chosen(a > b, a, b); }
 
-    SHARED int bits(EightFlags flags) {  // a bit a lane
+    // One bit for each lane.
+    SHARED int bits(EightFlags flags) {
 #if defined(__AVX2__) && !defined(PLAIN_VECTORS)
         return __builtin_ia32_movmskps256((Eight)flags);
 #elif defined(PLAIN_VECTORS)
@@ -122,6 +125,7 @@ struct Vectors {
 #endif
     }
 
+    // The largest of eight.
     SHARED float most(Eight v) {
 #if defined(PLAIN_VECTORS)
         for (int i = 1; i < 8; ++i) v[0] = greater(v[i], v[0]);
@@ -133,8 +137,8 @@ struct Vectors {
         return v[0];
     }
 
-    // a * b - c * d in three roundings: it changes its sign, and nothing else, when the products change places, and is
-    // 0 or has the right sign.
+    // a * b - c * d in three roundings. When the products change places, only its sign changes; it is 0 or has the right
+    // sign.
     SHARED Eight difference_of_products(Eight a, Eight b, Eight c, Eight d) {
         UNFUSED
 #if defined(__CUDA_ARCH__)

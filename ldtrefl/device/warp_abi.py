@@ -41,9 +41,11 @@ CALL_KERNEL = """
 
 
 def unknown_layout(command: wp.Launch, folders: Sequence[Path]) -> str | None:
-    """What is unknown of how a recorded CPU launch is called; None if all is as it should be. Calls no native code.
+    """What is unknown about how a recorded CPU launch is called; None if all is known. No native code is called.
 
-    ``folders`` are the kernel caches in which the C++ of the kernel may lie.
+    Args:
+        command: the launch.
+        folders: the kernel caches in which the C++ of its kernel may be.
     """
     try:
         bounds, *arguments = command.params
@@ -67,7 +69,7 @@ def entry_point(command: wp.Launch) -> int:
 
 
 def callable_natively(command: wp.Launch) -> bool:
-    """Whether ``CALL_KERNEL`` may call this kernel, with an item's number written over its first argument."""
+    """Whether ``CALL_KERNEL`` may call this kernel, with the number of an item written over its first argument."""
     return (
         command.block_dim == 1
         and type(command.params[0])._fields_ == BOUNDS_FIELDS
@@ -77,10 +79,10 @@ def callable_natively(command: wp.Launch) -> bool:
 
 
 class NativeCall:
-    """How ``CALL_KERNEL`` calls a kernel, for every recorded launch of it."""
+    """How ``CALL_KERNEL`` calls a kernel: the same for all recorded launches of it."""
 
     def __init__(self, command: wp.Launch) -> None:
-        # The entry point reads the arguments one after another as in a C structure; we copy whole words of it.
+        # The entry point reads the arguments one after another as in a C structure. Its size is in whole words.
         fields: list[tuple[str, Any]] = [(f"argument_{k}", type(value)) for k, value in enumerate(command.params[1:])]
         fields.append(("end", ctypes.c_uint64 * 0))
         self._type = type("Arguments", (ctypes.Structure,), {"_fields_": fields})
@@ -90,16 +92,16 @@ class NativeCall:
         self.argument_bytes = ctypes.sizeof(self._type)
 
     def is_for(self, command: wp.Launch) -> bool:
-        """Whether this launch is of the same code: Warp may have loaded the kernel anew."""
+        """Whether a launch is of the same code: Warp may have loaded the kernel anew."""
         return command.hooks is self._hooks
 
     def arguments(self, command: wp.Launch) -> ctypes.Structure:
-        """The arguments of a recorded launch."""
+        """The arguments of a recorded launch, as the entry point reads them."""
         return self._type(*command.params[1:])
 
 
 def _generated_source(command: wp.Launch, folders: Sequence[Path]) -> str:
-    """The C++ that Warp wrote for a kernel and keeps beside the object file."""
+    """The C++ that Warp wrote for a kernel, which it keeps beside the object file."""
     name = command.kernel.module.get_module_identifier(block_dim=command.block_dim)
     paths = [folder / name / f"{name}.cpp" for folder in folders]
     return next((path for path in paths if path.exists()), paths[0]).read_text()

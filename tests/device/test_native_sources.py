@@ -22,7 +22,8 @@ from ldtrefl.tracing.batch import trace_batch
 from ldtrefl.tracing.hit import Hit
 from ldtrefl.tracing.tracer import Query, array_of_views
 
-SHIM = """
+SHIM = (
+    """
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -32,7 +33,9 @@ namespace wp {
 template <int N> struct launch_bounds_t { uint32_t shape[N]; size_t size, coord_mult; };
 }
 """
-"""What Warp's headers give native functions."""
+    + warp_abi.CALL_KERNEL
+)
+"""What Warp's headers give native functions, and what ``warp_abi.py`` puts before the threads'."""
 
 SOURCES = {
     "device/cpu_threads.h": (cpu_threads.CONSTANTS, ()),
@@ -56,7 +59,7 @@ def test_every_file_is_here() -> None:
 def test_a_file_compiles_after_what_it_is_derived_from(name: str, plain: bool, tmp_path: Path) -> None:
     """In a function, as it will stand; ``plain`` is what compilers without vectors see."""
     constants, before = SOURCES[name]
-    body = warp_abi.CALL_KERNEL + native_sources.native_body(constants, (*before, name), "")
+    body = native_sources.native_body(constants, (*before, name), "")
     program = SHIM + "#define PLAIN_VECTORS\n" * plain + "void function() {\n" + body + "\n}\n"
     (tmp_path / "program.cpp").write_text(program)
     command = ["g++", "-std=c++17", "-fsyntax-only", "-Wall", "-Wextra", "-Werror", "-Wno-unused", "-Wno-psabi"]
