@@ -31,6 +31,8 @@ KERNEL_DECORATORS = ("kernel", "func", "func_native")
 """Names of what makes a function the device's. A kernel is made by ``kernel``, whatever module it is taken from."""
 
 WHOLE = {
+    "tests/device/test_cuda.py": "every kernel",
+    "tests/test_closed_forms.py": "the renderer with all that it stands on",
     "tests/test_habits.py": "every file",
     "tests/test_layering.py": "the imports of every file",
     "tests/test_readme.py": "README.md",

@@ -1,4 +1,6 @@
-"""Rays beside edges and vertices, and through them: as float64 says, but within 1e-7 of the mesh's size."""
+"""What the stress test takes for right beside edges and vertices: brute force and integers must agree with it, and
+wrong answers must be found.
+"""
 
 from __future__ import annotations
 
@@ -12,19 +14,7 @@ from stress_cases.edge_truth import ALLOWANCE, Right, Surface, examine, what_is_
 from stress_cases.truth import brute_force
 
 import ldtrefl
-
-RAYS = 1000
-"""Of each of seven kinds at each mesh: some 50,000 in all."""
-
-TRACERS = ["exact", "bvh"]
-SMALL = [name for name in edges.made() if "rod" not in name]
-ROD = "rod of triangles 10,000 : 1"
-
-
-@functools.cache
-def rays_at(name: str) -> list[tuple[str, edges.Rays, Right]]:
-    """The rays at a mesh of ``edges.made`` and what they may be answered."""
-    return list(edges.rays_at(edges.made()[name], RAYS))
+from tests.edge_rays import ROD, SMALL, rays_at
 
 
 def float64_hits(mesh: ldtrefl.Mesh, rays: edges.Rays) -> ldtrefl.Hits:
@@ -41,23 +31,6 @@ def float64_hits(mesh: ldtrefl.Mesh, rays: edges.Rays) -> ldtrefl.Hits:
     return ldtrefl.Hits(
         t, facet / np.sqrt(squared)[:, None], triangle, np.where(hit[:, None], np.column_stack([u, v]), 0.0), 0
     )
-
-
-@pytest.mark.parametrize("by", TRACERS)
-@pytest.mark.parametrize("name", SMALL)
-def test_nothing_slips_through_and_nothing_sticks_out(name: str, by: str) -> None:
-    trace = dict(edges.tracers(edges.made()[name]))[by]
-    for kind, given, right in rays_at(name):
-        outcome = edges.judge_edges(right, given, trace(*given), edges.held(by, kind))
-        assert outcome.passed, f"{kind}: {outcome}"
-
-
-@pytest.mark.parametrize("by", TRACERS)
-def test_slim_triangles_are_met_and_named_like_others(by: str) -> None:
-    trace = dict(edges.tracers(edges.made()[ROD]))[by]
-    for kind, given, right in rays_at(ROD):
-        outcome = edges.judge_edges(right, given, trace(*given), edges.held(by, kind))
-        assert outcome.passed, f"{kind}: {outcome}"
 
 
 @pytest.mark.parametrize("name", [*SMALL, ROD])
