@@ -169,8 +169,9 @@ def without_docstring(path: str) -> list[str]:
 
 
 def modules_of(room: str) -> list[str]:
-    """Names of the files of a room."""
-    return [Path(path).stem for path in files(f"{room}/*.py") if not path.endswith("__init__.py")]
+    """Names of the files and of the rooms inside a room."""
+    inner = [Path(path).parent.name for path in files(f"{room}/*/__init__.py")]
+    return inner + [Path(path).stem for path in files(f"{room}/*.py") if not path.endswith("__init__.py")]
 
 
 def room_of_test(path: str) -> str:
