@@ -51,6 +51,8 @@ def files(*patterns: str) -> list[str]:
 PYTHON = files("ldtrefl/**/*.py", "tools/**/*.py")
 """What users import and run."""
 
+HEADERS = files("ldtrefl/**/*.h", "tools/**/*.h")
+EVERY_FILE = [*files("*.*", "**/*.py", "scenes/**/*.*", "docs/**/*.*"), *HEADERS]
 ALL_PYTHON = [*PYTHON, *files("tests/**/*.py")]
 
 
@@ -211,11 +213,22 @@ def unsaid_usage(path: str) -> list[str]:
     return [what for what, pattern in wanted.items() if not re.search(pattern, words)]
 
 
+FILE_NAME = re.compile(r"[`(]([\w./-]+\.(?:py|h|md))[`)]")
+"""How docstrings and comments name a file."""
+
+
+def stale_names(path: str) -> list[str]:
+    """Files that docstrings and comments name and that are not there."""
+    named_files = set(FILE_NAME.findall(text_of(path)))
+    return [name for name in named_files if not any(f"/{known}".endswith(f"/{name}") for known in EVERY_FILE)]
+
+
 HABITS: dict[str, tuple[Callable[[str], list[str]], list[str]]] = {
-    "files of at most 400 lines": (long_files, [*ALL_PYTHON, *files("ldtrefl/**/*.h", "tools/**/*.h")]),
+    "files of at most 400 lines": (long_files, [*ALL_PYTHON, *HEADERS]),
     "functions of at most 60 lines": (long_functions, ALL_PYTHON),
     "no public parameter typed Any": (untyped_parameters, PYTHON),
     "kernels say what one thread does": (kernels_without_a_line, ALL_PYTHON),
+    "names of files that are there": (stale_names, [*PYTHON, *HEADERS]),
     "docstrings": (without_docstring, ALL_PYTHON),
     "every module has its test": (untested, PYTHON),
     "every test has its module": (homeless_test, TESTS),
@@ -235,6 +248,11 @@ def test_habit(habit: str) -> None:
     }
     assert not new, f"{habit}, but not here: {new}"
     assert not done, f"{habit}: mended, so take it out of tests/still_to_mend.py: {done}"
+
+
+def test_every_tool_stands_in_the_list_of_tools() -> None:
+    listed = set(re.findall(r"^\| `(\w+\.py)` \|", text_of("tools/README.md"), re.MULTILINE))
+    assert listed == {Path(path).name for path in files("tools/*.py") if '__name__ == "__main__"' in text_of(path)}
 
 
 def test_exceptions_are_still_some() -> None:

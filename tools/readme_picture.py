@@ -1,7 +1,9 @@
 """Renders the README's pictures: a scene by layered depth textures with the ray-traced truth inset, and peeled layers.
 
-python tools/readme_picture.py             # a few seconds; writes docs/teapot.png and docs/layers.png
-python tools/readme_picture.py FOLDER      # the same into another folder
+    python tools/readme_picture.py             # a few seconds; writes docs/teapot.png and docs/layers.png
+    python tools/readme_picture.py FOLDER      # the same into another folder
+
+The scene is ``scenes/teapot.toml``, and the layers are those of the shape ``genus3``.
 """
 
 from __future__ import annotations

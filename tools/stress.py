@@ -2,7 +2,7 @@
 
     python tools/stress.py                 # half an hour; writes tools/results/stress.json and stress.md
     python tools/stress.py --only fuzz     # one case, nothing written
-    python tools/stress.py --quick         # a minute or two, small counts
+    python tools/stress.py --quick         # three minutes, small counts
 
 Every search, every quality and the ray caster are held to limits that stand in the cases' files with their reasons.
 Exit status 1 if one is passed. Distances are in texels of a 256 map.
