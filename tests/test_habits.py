@@ -14,7 +14,7 @@ import pytest
 
 from tests.still_to_mend import STILL_TO_MEND
 
-HOUSE = Path(__file__).parent.parent
+ROOT = Path(__file__).parent.parent
 LONGEST_FILE = 400
 """Lines of a file."""
 
@@ -45,20 +45,20 @@ Function = ast.FunctionDef | ast.AsyncFunctionDef
 
 def files(*patterns: str) -> list[str]:
     """Paths of files from the top of the repository."""
-    return sorted(str(path.relative_to(HOUSE)) for pattern in patterns for path in HOUSE.glob(pattern))
+    return sorted(str(path.relative_to(ROOT)) for pattern in patterns for path in ROOT.glob(pattern))
 
 
 PYTHON = files("ldtrefl/**/*.py", "tools/**/*.py")
 """What users import and run."""
 
-HEADERS = files("ldtrefl/**/*.h", "tools/**/*.h")
-EVERY_FILE = [*files("*.*", "**/*.py", "scenes/**/*.*", "docs/**/*.*"), *HEADERS]
 ALL_PYTHON = [*PYTHON, *files("tests/**/*.py")]
+HEADERS = files("ldtrefl/**/*.h", "tools/**/*.h")
+PAGES = files("*.md", "docs/**/*.md", "tools/*.md")
 
 
 @functools.cache
 def text_of(path: str) -> str:
-    return (HOUSE / path).read_text()
+    return (ROOT / path).read_text()
 
 
 @functools.cache
@@ -220,7 +220,11 @@ FILE_NAME = re.compile(r"[`(]([\w./-]+\.(?:py|h|md))[`)]")
 def stale_names(path: str) -> list[str]:
     """Files that docstrings and comments name and that are not there."""
     named_files = set(FILE_NAME.findall(text_of(path)))
-    return [name for name in named_files if not any(f"/{known}".endswith(f"/{name}") for known in EVERY_FILE)]
+    return [
+        name
+        for name in named_files
+        if not any(f"/{known}".endswith(f"/{name}") for known in [*ALL_PYTHON, *HEADERS, *PAGES])
+    ]
 
 
 HABITS: dict[str, tuple[Callable[[str], list[str]], list[str]]] = {
