@@ -1,5 +1,10 @@
 """What the benchmark measures with: its rays, its judge, its ratios; never a time."""
 
+import json
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 from benchmark_parts import ratios, report, rivals, tables
@@ -9,7 +14,9 @@ from benchmark_parts.result import RaysRow
 from benchmark_parts.rivals import Embreex, Rival, available
 from benchmark_parts.truth import EDGE, Model, errors_of, truth
 
+ROOT = Path(__file__).parent.parent.parent
 FEW = 2000
+"""Rays of a kind."""
 
 
 def rays_of(name: str) -> dict[str, Rays]:
@@ -162,3 +169,26 @@ def test_a_rival_that_does_not_start_is_named_in_one_line(monkeypatch: pytest.Mo
 def test_tables_have_a_cell_for_every_column() -> None:
     lines = tables.table(["a", "b"], [["1", "2"], ["3", "-"]])
     assert lines == ["| a | b |", "|---|---|", "| 1 | 2 |", "| 3 | - |", ""]
+
+
+def test_benchmark_writes_what_it_promises(tmp_path: Path) -> None:
+    """A quick run: the shape of the output, never the times."""
+    command = [sys.executable, str(ROOT / "tools" / "benchmark.py"), "--quick", "-o", str(tmp_path)]
+    done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    kinds = ("error_against_time", "time_against_triangles", "build_against_triangles", "bytes_against_triangles")
+    plots = {f"{kind}.png" for kind in kinds}
+    assert {path.name for path in tmp_path.iterdir()} == plots | {"benchmark.json", "benchmark.md"}
+    result = json.loads((tmp_path / "benchmark.json").read_text())
+    parts = {"rays", "build", "memory", "error_against_time", "stages", "error_targets", "scaling", "paper"}
+    assert {"machine", "threads", "tracers", "notes"} | parts <= set(result)
+    assert all(result[part] for part in parts)
+    for row in result["rays"]:
+        assert len(row["kinds"]) >= 8
+        for kind in row["kinds"].values():
+            wrong = kind["errors"]["ldt exact"]
+            assert wrong["wrong_hits"] + wrong["wrong_misses"] <= 0.01
+            assert {"median", "min", "max"} <= set(kind["milliseconds"]["1"]["kernel"]["bvh"])
+    report = (tmp_path / "benchmark.md").read_text()
+    assert all(row["mesh"] in report for row in result["rays"])
+    assert all(note in report for note in result["notes"])
