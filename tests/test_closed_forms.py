@@ -18,7 +18,7 @@ def emitter(color: tuple[float, float, float]) -> Material:
 
 @pytest.mark.parametrize("method", ["bvh", "ldt"])
 def test_plane_mirror_shows_the_virtual_image(method: str) -> None:
-    """The mirror's image of an object is what a camera sees of the mirrored object, to the pixel but for its rim."""
+    """What the mirror shows of an object is what a camera sees of the mirrored object, to the pixel."""
     camera = Camera(eye=(2.5, -4.0, 1.5), look_at=(0, 0.5, 0), width=288, height=192, fov_y=40)
     knot = {"shape": "torus_knot", "params": {"segments": [200, 40]}, "scale": 0.8}
     wall = Object(shape="plane", scale=50.0, rotate=(1, 0, 0, 90), translate=(0, 1.0, 0), material=MIRROR)
@@ -108,7 +108,7 @@ def test_fresnel_follows_schlick() -> None:
 
 @pytest.mark.parametrize("method", ["bvh", "ldt", "envmap"])
 def test_an_eye_in_a_mirrors_surface_sees_a_finite_picture(method: str) -> None:
-    """There is no direction from the eye to what it touches."""
+    """The direction from the eye to a point that it touches is not defined."""
     for shape, eye in (("sphere", (0, 0, 1)), ("plane", (0, 0, 0)), ("box", (1, 1, 1))):
         camera = Camera(eye=eye, look_at=(0, 0.1, -2), width=9, height=9)
         objects = (Object(shape=shape, material=MIRROR), Object(shape="box", translate=(3, 0, 0)))

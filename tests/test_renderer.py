@@ -2,7 +2,7 @@
 
 import dataclasses
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from stress_cases.histories import difference
 import ldtrefl
 from ldtrefl import renderer as renderer_module
 from ldtrefl.device import launch
+from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.renderer import Frame
 from ldtrefl.scene.description import Object
 from tests.frame_scenes import assert_as_fresh, scene
@@ -27,13 +28,14 @@ def test_a_move_that_cannot_be_is_refused() -> None:
         renderer.move("torus", rotate=(0, 0, 0, 10))
 
 
-def scribble(values: Any) -> None:
-    """Write into every array there is."""
+def scribble(values: Iterable[np.ndarray]) -> None:
+    """Write into every element of some arrays."""
     for array in values:
         array[...] = 1 if array.dtype == bool else 77
 
 
-def arrays_of(frame: Frame, drawn: Any) -> list[np.ndarray]:
+def arrays_of(frame: Frame, drawn: GBuffer) -> list[np.ndarray]:
+    """All arrays that a frame and its G-buffer hand out."""
     assert frame.hits is not None
     hits = [frame.hits.distance, frame.hits.object, frame.hits.triangle]
     seen = [drawn.objects, drawn.triangles, drawn.reflector_mask]
@@ -65,11 +67,11 @@ def test_arrays_of_a_frame_stay_as_they_are() -> None:
 
 
 class Stop(BaseException):
-    """Stands for Ctrl-C."""
+    """Stands for the exception that Ctrl-C raises."""
 
 
 def stopping_at(monkeypatch: pytest.MonkeyPatch, launches: int) -> Callable[[], None]:
-    """Have the launch after so many raise ``Stop``, once; call what is returned to end that."""
+    """Let so many launches run and have the next one raise ``Stop``. The function that is returned undoes this."""
     whole, left = launch.launch, [launches]
 
     def stopped(*arguments: Any) -> None:

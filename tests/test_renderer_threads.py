@@ -26,7 +26,7 @@ def test_threads_get_their_own_frames(by: str, count: int, picture: str) -> None
 
 
 def test_frames_and_moves_of_several_threads() -> None:
-    """Every frame is the scene's before a move or after it, never something between."""
+    """Every frame shows the scene before a move or after it, never something between."""
     renderer = ldtrefl.Renderer(scene(), "ldt")
     places = ((-1.4, -1.2, 0.2), (-1.0, -1.5, 0.0))
     moved = [ldtrefl.render(scene().with_object("torus", translate=place), "ldt") for place in places]
@@ -46,7 +46,7 @@ def test_frames_and_moves_of_several_threads() -> None:
 
 
 def test_renderers_are_made_by_several_threads() -> None:
-    """Meshes and kernels are shared: whoever comes first makes them."""
+    """Meshes and kernels are shared: the thread that needs them first makes them."""
     frames: list[Frame] = []
     params = {"segments": [90, 12]}
 

@@ -35,7 +35,7 @@ def test_only_what_a_move_touches_is_done_again() -> None:
     assert 0 < counters["rays"] < 0.5 * first.stats.counters["rays"]
     assert counters["rays"] + counters["rays_kept"] == counters["reflector_pixels"]
     assert "objects_peeled" not in counters
-    np.testing.assert_array_equal(first.image, before)  # what was handed out stays as it was
+    np.testing.assert_array_equal(first.image, before)  # the first frame's array is the caller's
     renderer.move("torus", rotate=(1, 1, 0, 50), scale=0.3)
     assert_as_fresh(renderer, renderer.render())
 

@@ -8,7 +8,7 @@ from ldtrefl.scene.description import Camera, Object, Scene
 
 
 def test_many_small_objects_are_drawn_like_one_mesh() -> None:
-    """Boxes one by one cover the pixels that the same boxes cover as one mesh."""
+    """Many boxes cover the same pixels as one mesh of all of them."""
     camera = Camera(eye=(0, -6, 2), look_at=(0, 0, 0), width=96, height=64, fov_y=40)
     places = np.random.default_rng(2).uniform(-1.5, 1.5, (300, 3))
     box = shapes.make("box")

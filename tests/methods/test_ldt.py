@@ -48,7 +48,7 @@ def test_resolutions_do_not_depend_on_what_is_skipped(skip: str, options: dict[s
 
 @pytest.mark.parametrize("shadows", [False, True])
 def test_coarse_maps_hide_nothing_from_the_search_by_bounds(shadows: bool) -> None:
-    """Patches of coarse maps rise out of the sphere about their object: no skip may show what another hides."""
+    """Patches of coarse maps stick out of the bounding sphere of their object; no skip may miss a hit on them."""
     rng = np.random.default_rng(4)
     dense = (("sphere", (400, 200)), ("torus_knot", (400, 40)), ("torus", (300, 100)))
     for error in (1.0, 8.0, 32.0):

@@ -1,4 +1,4 @@
-"""Tracing: the ray caster against Embree, layered depth textures against the ray caster, and odd rays."""
+"""Tracing: the ray caster against Embree, layered depth textures against the ray caster, and rays of any form."""
 
 from collections.abc import Callable
 

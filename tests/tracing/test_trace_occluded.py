@@ -32,7 +32,7 @@ def mesh_of(name: str) -> ldtrefl.Mesh:
 
 @functools.cache
 def tracer_of(by: str, name: str) -> Any:
-    """What has ``trace`` and ``occluded``."""
+    """A tracer of this mesh, with the methods ``trace`` and ``occluded``."""
     mesh = mesh_of(name)
     if by == "bvh":
         return ldtrefl.Raycaster(mesh.vertices, mesh.faces)
@@ -54,7 +54,7 @@ def rays_at(name: str) -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.parametrize("by", TRACERS)
 @pytest.mark.parametrize("name", MESHES)
 def test_it_is_what_trace_meets_before_t_max(name: str, by: str) -> None:
-    """Without a limit, with one for all, and with limits just before and just behind what is met."""
+    """Without a limit, with one limit for all rays, and with limits just before and just behind what each ray meets."""
     tracer, (origins, directions) = tracer_of(by, name), rays_at(name)
     t = tracer.trace(origins, directions).t
     assert 0.2 < np.isfinite(t).mean() < 1.0
@@ -63,7 +63,7 @@ def test_it_is_what_trace_meets_before_t_max(name: str, by: str) -> None:
         is_clear = np.abs(t - t_max) > 1e-5 * t_max if np.isfinite(t_max) else np.ones(len(t), bool)
         answer = tracer.occluded(origins, directions, t_max=t_max)
         np.testing.assert_array_equal(answer[is_clear], (t < t_max)[is_clear])
-    # What is met at the start itself cannot be stopped short of.
+    # A ray cannot be stopped short of what it meets at its very start.
     hit = np.isfinite(t) & (t > 1e-3)
     rays = origins[hit], directions[hit]
     assert not tracer.occluded(*rays, t_max=t[hit] * np.float32(0.999)).any()
@@ -101,7 +101,7 @@ def test_shapes_and_limits_of_any_shape(by: str) -> None:
 
 @pytest.mark.parametrize("by", TRACERS)
 def test_limits_that_leave_nothing(by: str) -> None:
-    """Before 0, before a distance that is no number, and before minus infinity nothing is met."""
+    """Nothing is met before 0, before NaN, and before minus infinity."""
     tracer, (origins, directions) = tracer_of(by, "box"), rays_at("box")
     for t_max in (0.0, -1.0, np.nan, -np.inf):
         assert not tracer.occluded(origins, directions, t_max=t_max).any()
@@ -121,7 +121,7 @@ def test_t_max_is_in_lengths_of_the_direction(by: str, length: float) -> None:
 
 @pytest.mark.parametrize("by", TRACERS)
 def test_rays_that_are_none_are_not_occluded(by: str) -> None:
-    """Nor do they disturb the others, and nothing is said of them."""
+    """Rays that are zero, NaN or infinite; the others are answered as without them, and no warning is given."""
     tracer = tracer_of(by, "box")
     odd = np.array([[0, 0, 0], [np.nan, 0, 1], [np.inf, 0, 0], [0, 0, 1]], np.float32)
     assert tracer.occluded(np.float32([[0, 0, -5]] * 4), odd).tolist() == [False, False, False, True]

@@ -18,7 +18,7 @@ from tests.edge_rays import ROD, SMALL, rays_at
 
 
 def float64_hits(mesh: ldtrefl.Mesh, rays: edges.Rays) -> ldtrefl.Hits:
-    """Brute force's answers, none of it rounded."""
+    """Brute force's answers in float64, not rounded to float32."""
     origins, directions = (x.astype(float) for x in rays)
     t, triangle = brute_force(mesh, origins, directions)
     hit = np.isfinite(t)
@@ -35,9 +35,9 @@ def float64_hits(mesh: ldtrefl.Mesh, rays: edges.Rays) -> ldtrefl.Hits:
 
 @pytest.mark.parametrize("name", [*SMALL, ROD])
 def test_what_float64_answers_is_right_at_any_allowance(name: str) -> None:
-    """Brute force over all triangles finds what the tree of boxes and the patches do; and with vertices rounded as
-    tracers round them it stays within the allowance. Rays through vertices and edges are left out: there brute force
-    itself slips."""
+    """Brute force over all triangles agrees with the tree of boxes and the patches. With vertices rounded as tracers
+    round them its answers stay within the allowance. Rays through vertices and edges are left out: there brute force
+    itself lets rays slip through."""
     mesh = edges.made()[name]
     centre, half = mesh.unit_frame
     rounded = ldtrefl.Mesh(mesh.unit_vertices.astype(float) * half + centre, mesh.faces)
@@ -51,8 +51,8 @@ def test_what_float64_answers_is_right_at_any_allowance(name: str) -> None:
 
 
 def integer_hits(mesh: ldtrefl.Mesh, rays: edges.Rays) -> ldtrefl.Hits:
-    """Brute force in integers, exact: signed volumes, whose signs are those of float64 without rounding. A ray through
-    an edge or a vertex meets every triangle that has it."""
+    """Brute force by signed volumes in integers, which are exact. A ray through an edge or a vertex meets every
+    triangle that has it."""
     scaled = [2.0**14 * x.astype(float) for x in (mesh.vertices, *rays)]
     vertices, origins, directions = (x.astype(np.int64) for x in scaled)
     assert all((exact == x).all() for exact, x in zip((vertices, origins, directions), scaled, strict=True))
@@ -88,8 +88,8 @@ def test_what_integers_answer_exactly_at_vertices_and_edges_is_right(name: str) 
 
 @pytest.mark.parametrize("name", ["box", "icosphere on a lattice", "knot"])
 def test_what_must_hit_hits_however_it_is_moved(name: str) -> None:
-    """Rays moved aside within the allowance, by brute force: all hit where a ray must, none where nothing may be met,
-    and where it is free mostly some do and some do not."""
+    """Rays are moved aside within the allowance and traced by brute force. Where a ray must hit, all of them hit; where
+    it must miss, none; and where it may do either, mostly some do and some do not."""
     mesh, rng = edges.made()[name], np.random.default_rng(0)
     both, free = 0, 0
     for kind, given, right in rays_at(name):
@@ -111,7 +111,7 @@ def test_what_must_hit_hits_however_it_is_moved(name: str) -> None:
 
 @functools.cache
 def a_knot() -> tuple[ldtrefl.Mesh, edges.Rays, Right, ldtrefl.Hits]:
-    """A mesh, rays beside its edges, and float64's answers, of which nothing is wrong."""
+    """A mesh, rays beside its edges, what is right, and the answers of float64, which are right."""
     mesh = edges.made()["knot"]
     surface = Surface(mesh)
     given = edges.grazing(surface, 2000, np.random.default_rng(1))
@@ -148,7 +148,7 @@ def test_barycentrics_and_normals_of_another_place_are_found() -> None:
 
 @pytest.mark.parametrize(("scale", "fault"), [(1 + 1e-5, "sticks_out"), (1 - 1e-5, "slips")])
 def test_triangles_that_are_widened_or_shrunk_are_found(scale: float, fault: str) -> None:
-    """Each triangle grown about its middle, as by a slack in barycentrics, or shrunk, so that there are cracks."""
+    """Each triangle is grown about its middle, as a slack in barycentrics does, or shrunk, so that there are cracks."""
     mesh, given, right, _ = a_knot()
     corners = mesh.vertices[mesh.faces]
     middle = corners.mean(axis=1, keepdims=True)
@@ -159,7 +159,7 @@ def test_triangles_that_are_widened_or_shrunk_are_found(scale: float, fault: str
 
 
 def test_borders_are_free_and_seams_are_none() -> None:
-    """Of an open mesh nothing must be met at the border, and vertices that are doubled for a texture are one."""
+    """At the border of an open mesh nothing must be met; vertices that are doubled for a texture count as one."""
     plane = ldtrefl.Mesh(
         [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, -1, 0], [1, 1, 0], [-1, 1, 0]], [[0, 1, 2], [3, 4, 5]]
     )
