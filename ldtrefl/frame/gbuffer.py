@@ -114,6 +114,7 @@ def find_surfaces(
     position_out: wp.array(dtype=wp.vec3d),
     normal_out: wp.array(dtype=wp.vec3),
 ):
+    """Find where the surface of one pixel lies, and its shading normal."""
     i = first + wp.tid()
     if gbuffer.object[i] >= 0:
         surface = pixel_surface(gbuffer, objects, i, pixel_view(gbuffer, objects, i))

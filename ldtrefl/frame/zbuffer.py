@@ -59,6 +59,7 @@ def draw_small_triangles(
     count_out: wp.array(dtype=wp.int32),
     list_out: wp.array(dtype=wp.int32),
 ):
+    """Draw the triangles of one chunk, but list those whose boxes are large."""
     chunk = first + wp.tid()
     mesh = object_triangles(objects, chunks.object[chunk], corners, width, first_row, end_row)
     begin = chunks.begin[chunk]
@@ -85,6 +86,7 @@ def draw_large_triangles(
     # Out:
     key_out: wp.array(dtype=wp.int64),
 ):
+    """Draw one strip of rows of a large triangle."""
     i = first + wp.tid()
     strips = (end_row - first_row + STRIP - 1) / STRIP
     number = large[i / strips]

@@ -1,7 +1,7 @@
-// Rays as users give them, on their way into an object's unit space, and what they meet on its way out (trace.py).
+// Rays as users give them, on their way into an object's unit space, and what they meet on its way out (batch.py).
 
 struct RayBatch : Vectors {
-    // A ray in unit space, as ``Query`` of trace.py has it.
+    // A ray in unit space, as ``Query`` of tracer.py has it.
     struct Query {
         double origin[3];
         float direction[3], t_max;

@@ -27,6 +27,7 @@ def answer_flat(
     radius: wp.array(dtype=float),
     flat_out: wp.array(dtype=int),
 ):
+    """Ask of one mirror triangle whether it shows a sphere."""
     i = first + wp.tid()
     flat_out[i] = int(shows_flat(eye[i], corners[i, 0], corners[i, 1], corners[i, 2], centre[i], radius[i]))
 
