@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from ldtrefl.device import launch
-from ldtrefl.frame.gbuffer import draw_gbuffer
+from ldtrefl.frame.visibility import draw_gbuffer
 from ldtrefl.scene.description import Camera, Object, Scene
 from ldtrefl.tracing.bvh import Raycaster
 from ldtrefl.world.device_scene import DeviceScene
