@@ -33,7 +33,8 @@ if TYPE_CHECKING:
     from ldtrefl.files.map_cache import MapCache, keep_maps_in
     from ldtrefl.files.picture_reading import load_image
     from ldtrefl.files.picture_writing import save_image
-    from ldtrefl.ldt.texture import LayeredDepthTexture, peel
+    from ldtrefl.ldt.peel import peel
+    from ldtrefl.ldt.texture import LayeredDepthTexture
     from ldtrefl.renderer import Frame, Renderer, render
     from ldtrefl.scene.description import (
         Camera,
@@ -103,7 +104,7 @@ _HOMES = {
     "load_image": "files.picture_reading",
     "load_mesh": "scene.readers.mesh_files",
     "load_scene": "scene.load",
-    "peel": "ldt.texture",
+    "peel": "ldt.peel",
     "progress_to": "device.progress",
     "render": "renderer",
     "save_image": "files.picture_writing",

@@ -33,7 +33,8 @@ from ldtrefl.device.progress import progress_to
 from ldtrefl.files.atomic_write import writable_folder, written_whole
 from ldtrefl.files.map_cache import MapCache, keep_maps_in
 from ldtrefl.files.picture_writing import check_writable, save_image
-from ldtrefl.ldt.texture import DEFAULT_RESOLUTION, peel_mesh
+from ldtrefl.ldt.options import DEFAULT_RESOLUTION
+from ldtrefl.ldt.peel import peel_mesh
 from ldtrefl.methods import all_methods, find_method
 from ldtrefl.renderer import Frame, Renderer
 from ldtrefl.scene import shapes

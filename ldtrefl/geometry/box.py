@@ -64,3 +64,15 @@ def cells_about(cell: wp.vec3i, grid: wp.vec3i) -> CellBox:
     box.first = wp.max(cell - wp.vec3i(1, 1, 1), wp.vec3i(0, 0, 0))
     box.last = wp.min(cell + wp.vec3i(1, 1, 1), grid - wp.vec3i(1, 1, 1))
     return box
+
+
+@wp.func
+def cell_holding(x: float, cells: int) -> int:
+    """The cell along an axis that holds a coordinate, in cells; the nearest of ``cells`` if none does."""
+    return wp.clamp(int(wp.floor(x)), 0, cells - 1)
+
+
+@wp.func
+def cell_number(cell: wp.vec3i, grid: wp.vec3i) -> int:
+    """The number of a cell among all of a grid, along x first, then y, then z."""
+    return (cell[2] * grid[1] + cell[1]) * grid[0] + cell[0]

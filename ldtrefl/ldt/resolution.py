@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ldtrefl.ldt.texture import FEWEST_TEXELS, MOST_TEXELS
+from ldtrefl.ldt.options import FEWEST_TEXELS, MOST_TEXELS
 from ldtrefl.world.device_mesh import DeviceMesh
 from ldtrefl.world.device_scene import DeviceScene
 

@@ -10,9 +10,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ldtrefl.device.stats import Stats
-from ldtrefl.ldt.exact.record_choice import Quality
+from ldtrefl.ldt.options import DEFAULT_RESOLUTION, LinearSteps, Quality
+from ldtrefl.ldt.peel import peel_mesh
 from ldtrefl.ldt.searches import TRACERS
-from ldtrefl.ldt.texture import DEFAULT_RESOLUTION, LayeredDepthTexture, LinearSteps, peel_mesh
+from ldtrefl.ldt.texture import LayeredDepthTexture
 from ldtrefl.tracing.tracer import BoundTracer, array_of_views
 from ldtrefl.world.device_mesh import DeviceMesh
 from ldtrefl.world.device_scene import DeviceScene

@@ -32,18 +32,18 @@ from ldtrefl.frame.history import Reusable
 from ldtrefl.frame.reflected_light import ReflectedLight
 from ldtrefl.frame.refollow import changed_runs, follow_changed
 from ldtrefl.frame.regions import Regions, all_objects, safe_regions
-from ldtrefl.ldt.exact.record_choice import Quality
-from ldtrefl.ldt.resolution import resolutions_for
-from ldtrefl.ldt.scene_maps import MapOptions, SceneMaps
-from ldtrefl.ldt.texture import (
+from ldtrefl.ldt.options import (
     BINARY_STEPS,
     DEFAULT_QUALITY,
     FEWEST_TEXELS,
     TEXEL,
     BinarySteps,
     LinearSteps,
+    Quality,
     Resolution,
 )
+from ldtrefl.ldt.resolution import resolutions_for
+from ldtrefl.ldt.scene_maps import MapOptions, SceneMaps
 from ldtrefl.methods.base import CONFIG, CommonConfig, RayMethod
 from ldtrefl.tracing.nothing import no_shadows
 from ldtrefl.tracing.ray_buffers import RayBuffer

@@ -13,7 +13,7 @@ from stress_cases.inputs import rays_about
 
 import ldtrefl
 from ldtrefl.device import cpu_threads, native_sources, warp_abi
-from ldtrefl.ldt.exact import build, walk
+from ldtrefl.ldt.exact import walk, wide_tree
 from ldtrefl.ldt.exact.tree import TreeView
 from ldtrefl.ldt.exact.walk import CONSTANTS, FILES, SEARCH, TREE
 from ldtrefl.ldt.linear import march
@@ -39,11 +39,14 @@ template <int N> struct launch_bounds_t { uint32_t shape[N]; size_t size, coord_
 
 SOURCES = {
     "device/cpu_threads.h": (cpu_threads.CONSTANTS, ()),
-    "ldt/linear/march.h": (march.CONSTANTS, ()),
-    "device/vectors.h": (build.CONSTANTS, ()),
+    "device/vectors.h": ({}, ()),
     "tracing/ray_batch.h": ({}, ("device/vectors.h",)),
-    "ldt/exact/build.h": (build.CONSTANTS, ("device/vectors.h",)),
-    **{name: (walk.CONSTANTS, FILES[:number]) for number, name in enumerate(FILES) if name.startswith("ldt")},
+    **{
+        name: (module.CONSTANTS, module.FILES[:number])
+        for module in (march, wide_tree, walk)
+        for number, name in enumerate(module.FILES)
+        if name.startswith("ldt")
+    },
 }
 
 

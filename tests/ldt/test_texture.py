@@ -1,10 +1,73 @@
-"""Layered depth textures: hits on a cube, which are known on paper; arrays are taken and handed out as copies."""
+"""A layered depth texture: its layers, what is made only when it is asked for, and copies of arrays in and out."""
+
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 
 import ldtrefl
+from ldtrefl.ldt.maps import MapsView
 from ldtrefl.scene import shapes
+
+MEAN_LAYERS = {
+    # Mean surface crossings of the rays of a 128 x 128 grid that hit, along x, y and z: from the meshes' own listing,
+    # made by another program.
+    "armadillo.ply": (2.91, 2.81, 2.16),
+    "happy_buddha.ply": (2.85, 4.84, 2.33),
+    "lucy.ply": (2.98, 2.47, 4.33),
+    "bunny_open.ply": (2.23, 2.44, 2.06),
+    "boot.ply": (3.04, 2.41, 2.44),
+    "teapot.ply": (4.36, 4.09, 3.86),
+    "cycloidal_drive.ply": (10.19, 10.32, 7.95),
+    "mosquito_in_amber.ply": (2.40, 2.50, 2.49),
+    "sheen_chair.glb": (3.52, 2.58, 2.51),
+    "dish_with_olives.glb": (6.18, 6.05, 6.27),
+    "spot.glb": (2.30, 2.09, 2.34),
+}
+
+
+@pytest.mark.parametrize("name", sorted(MEAN_LAYERS))
+def test_layers_of_real_meshes(real_mesh: Callable, name: str) -> None:
+    mesh = real_mesh(name)
+    maps = ldtrefl.peel(mesh.vertices, mesh.faces, resolution=128)
+    means = [maps.counts(axis)[maps.counts(axis) > 0].mean() for axis in range(3)]
+    np.testing.assert_allclose(means, MEAN_LAYERS[name], rtol=0.03)
+
+
+def test_convex_objects_have_one_layer_and_shells_as_many_as_there_are() -> None:
+    ball = shapes.make("sphere", {"segments": [48, 24]})
+    assert set(ldtrefl.peel(ball.vertices, ball.faces, resolution=64).layers().values()) == {1}
+    scales = np.linspace(0.5, 1.0, 40)
+    vertices = np.concatenate([s * ball.vertices for s in scales])
+    faces = np.concatenate([ball.faces + i * len(ball.vertices) for i in range(len(scales))])
+    maps = ldtrefl.peel(vertices, faces, resolution=64)
+    assert set(maps.layers().values()) == {40}
+    assert maps.counts(0).max() == 80
+
+
+def test_each_search_makes_what_it_reads_and_no_more() -> None:
+    mesh = shapes.make("torus")
+    maps = ldtrefl.peel(mesh.vertices, mesh.faces, 32)
+    tree_bytes = maps.nbytes
+    assert maps.record_count == len(mesh.faces) and tree_bytes == maps.tree.nbytes
+    fragments = maps.fragment_count  # counted, not made
+    assert maps.record_count == len(mesh.faces)
+    view = maps.view("linear")
+    assert isinstance(view, type(MapsView())) and view.start.size == maps.frame.first_texels[3] + 1
+    assert maps.fragment_count == fragments == maps.depth.size
+    assert maps.record_count == len(mesh.faces) + fragments and maps.nbytes > tree_bytes
+
+
+def test_unknown_searches_and_steps_are_refused() -> None:
+    mesh = shapes.make("box")
+    maps = ldtrefl.peel(mesh.vertices, mesh.faces, 16)
+    rays = [[0.0, 0.0, 5.0]], [[0.0, 0.0, -1.0]]
+    with pytest.raises(ldtrefl.InputError, match=r"unknown search 'exakt'; did you mean 'exact'\?"):
+        maps.trace(*rays, search="exakt")
+    with pytest.raises(ldtrefl.InputError, match="linear_steps: should be 'texel' or a whole number from 1 to 100000"):
+        maps.trace(*rays, search="linear", linear_steps=0)
+    with pytest.raises(ldtrefl.InputError, match="binary_steps"):
+        maps.occluded(*rays, search="linear", binary_steps=65)
 
 
 def test_vertices_that_are_handed_in_stay_the_callers() -> None:

@@ -9,7 +9,8 @@ from timing import timed_in_turn
 
 import ldtrefl
 from ldtrefl.device import launch
-from ldtrefl.ldt.texture import LayeredDepthTexture, peel_mesh
+from ldtrefl.ldt.peel import peel_mesh
+from ldtrefl.ldt.texture import LayeredDepthTexture
 from ldtrefl.tracing.bvh import Raycaster
 from ldtrefl.world.device_mesh import DeviceMesh
 

@@ -10,7 +10,7 @@ import warp as wp
 
 import ldtrefl
 from ldtrefl.device import launch
-from ldtrefl.ldt.exact.record_choice import Quality
+from ldtrefl.ldt.options import Quality
 from ldtrefl.ldt.searches import TRACERS
 from ldtrefl.tracing.bvh import BVH
 from ldtrefl.tracing.tracer import Tracer

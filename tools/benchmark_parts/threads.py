@@ -10,8 +10,8 @@ from timing import timed_in_turn
 
 import ldtrefl
 from ldtrefl.device import launch
+from ldtrefl.ldt.peel import peel_mesh
 from ldtrefl.ldt.searches import TRACERS
-from ldtrefl.ldt.texture import peel_mesh
 from ldtrefl.scene import shapes
 from ldtrefl.world.device_mesh import DeviceMesh
 

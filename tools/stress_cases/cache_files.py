@@ -28,7 +28,7 @@ import ldtrefl
 from ldtrefl.device import launch
 from ldtrefl.files.map_cache import MapCache, keep_maps_in
 from ldtrefl.files.map_file import HEADER, MAGIC, Entry
-from ldtrefl.ldt.texture import peel_mesh
+from ldtrefl.ldt.peel import peel_mesh
 from ldtrefl.scene import shapes
 from ldtrefl.world.device_mesh import DeviceMesh
 

@@ -10,7 +10,8 @@ from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis import strategies as st
 
 import ldtrefl
-from ldtrefl.ldt.exact.record_choice import FEW_TRIANGLES, Quality
+from ldtrefl.ldt.exact.record_choice import FEW_TRIANGLES
+from ldtrefl.ldt.options import Quality
 from ldtrefl.scene import shapes
 
 from .inputs import moved

@@ -27,12 +27,12 @@ struct TreeAnswer : TreeWalk {
         Answer answer;
         answer.t = (float)(rays.t_of_origin[lane] + rays.nearest[lane]);
         if (rays.record_is_patch[lane]) {
-            answer.triangle = as_int(r[PATCH_NUMBER * LANES]);
-            const float axis = r[PATCH_KIND * LANES];
+            answer.triangle = as_int(r[PATCH_TRIANGLE_ROW * LANES]);
+            const float axis = r[PATCH_AXIS_ROW * LANES];
             answer.u = answer.v = axis > (float)(int)axis ? LARGE_PATCH : -1.0f;
             for (int k = 0; k < 3; ++k) answer.normal[k] = r[k * LANES];
         } else {
-            answer.triangle = as_int(r[TRIANGLE_NUMBER * LANES]);
+            answer.triangle = as_int(r[TRIANGLE_NUMBER_ROW * LANES]);
             answer.u = rays.u[lane];
             answer.v = rays.v[lane];
             find_normal(r, answer.normal);

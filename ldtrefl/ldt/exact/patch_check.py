@@ -1,10 +1,10 @@
 """Where patches do not follow the surface: there its triangles are kept.
 
 A patch is the plane of one triangle over a texel. Where a surface is smooth at the scale of texels, neighbours in a map
-go on into each other; where it turns out of what one map faces, another map goes on. Its planes are then moved to the
+go on into each other; where it turns out of what one map faces, another map goes on. Such patches are then moved to the
 mean height of the surface over their texels. Where neighbours do not go on (the surface is rough, bent within a few
 texels, ends, or has an edge), a patch may be off by a texel: it is *doubtful*, and so are the cells that it lies in. No
-patch is kept there, and every triangle is.
+patch is used there, and every triangle is.
 """
 
 from __future__ import annotations
@@ -16,15 +16,14 @@ import warp as wp
 
 from ldtrefl.device.bins import CHUNK, bin_items, chunk_count, gather_lists, launch_chunks
 from ldtrefl.device.launch import kernel, launch
-from ldtrefl.ldt.exact.patches import Survey
-from ldtrefl.ldt.exact.pieces import Piece, cell_number, high_corner, low_corner, number_of_cell
+from ldtrefl.geometry.box import cell_count, cell_number, cell_of_box, cells_about
+from ldtrefl.ldt.exact.patch import Patch, cells_of_patch, crosses_cell, patch_middle, patch_normal
+from ldtrefl.ldt.exact.survey import Survey
 from ldtrefl.ldt.texel_frame import point_from_texel
 
 RISE_PER_TURN = wp.constant(1.12 / 24.0)
 """Of the summed heights of the four neighbours' middles over a patch's plane, the mean height over the patch of the
 paraboloid through them: x^2 / 2 is a 24th of a side's square on average, and a patch is a little wider than a texel."""
-
-
 REACH = wp.constant(1.0)
 """Sides of a patch from its plane within which a neighbour is looked for."""
 OFF_BESIDE = wp.constant(0.5)
@@ -35,33 +34,8 @@ AHEAD = wp.constant(0.6)
 """Of a step to the next texel, how far ahead a neighbour in another map must lie: a surface that goes on so far ends
 behind the patch's margin."""
 
-
-@wp.struct
-class PatchCells:
-    """The cells of the survey in the box about a patch, which is smaller than a cell."""
-
-    first: wp.vec3i
-    last: wp.vec3i
-
-
-@wp.func
-def cells_of_patch(cells: wp.vec3i, piece: Piece) -> PatchCells:
-    """The cells in the box about a patch."""
-    low, high = low_corner(piece), high_corner(piece)
-    box = PatchCells()
-    for axis in range(3):
-        box.first[axis] = cell_number(low[axis], cells[axis])
-        box.last[axis] = cell_number(high[axis], cells[axis])
-    return box
-
-
-@wp.func
-def crosses_cell(piece: Piece, x: int, y: int, z: int) -> bool:
-    """Whether the plane of a patch crosses a cell."""
-    normal = wp.cross(piece.edge_u, piece.edge_v)
-    middle = wp.vec3(float(x) + 0.5, float(y) + 0.5, float(z) + 0.5)
-    reach = 0.5 * (wp.abs(normal[0]) + wp.abs(normal[1]) + wp.abs(normal[2]))
-    return wp.abs(wp.dot(normal, middle - piece.corner)) <= reach
+NONE, GOES_ON, TURNS_AWAY = wp.constant(0), wp.constant(1), wp.constant(-1)
+"""What lies beside a patch: no patch, one that the surface goes on in, or one that is turned or offset."""
 
 
 @wp.struct
@@ -76,7 +50,7 @@ class PatchPlane:
 class PatchMap:
     """Patches, texel by texel."""
 
-    patches: wp.array(dtype=Piece)
+    patches: wp.array(dtype=Patch)
     planes: wp.array(dtype=PatchPlane)
     texel: wp.array(dtype=wp.int32)  # of each patch
     start: wp.array(dtype=wp.int32)  # first patch of each texel, the three axes' maps in a row
@@ -84,47 +58,47 @@ class PatchMap:
     first_texel: wp.vec3i
     cells_per_texel: float
     cells: wp.vec3i
+    largest_turn: float  # radians between neighbours from which they are doubtful
 
 
 @wp.struct
 class Neighbour:
     """What a map holds beside a patch."""
 
-    follows: int  # 1 if the surface goes on where the patch's plane leads, 0 if there is none, -1 if turned or offset
-    height: float  # over the plane, cells
+    is_there: int  # NONE, GOES_ON or TURNS_AWAY
+    height: float  # over the patch's plane, cells
     is_beside: bool  # in the same map
 
 
 @wp.func
-def neighbour_of(
-    maps: PatchMap, middle: wp.vec3, normal: wp.vec3, ahead: wp.vec3, texel: int, largest_turn: float, off: float
-) -> Neighbour:
-    """The patch of a texel that is nearest to a plane, faces the same way, and lies ``ahead`` of the plane's middle, or
-    anywhere if that is 0; ``off`` sides off the plane are allowed per radian."""
+def nearest_in_texel(maps: PatchMap, plane: PatchPlane, ahead: wp.vec3, texel: int, off: float) -> Neighbour:
+    """The patch of a texel that is nearest to a plane and faces the same way.
+
+    It must lie ``ahead`` of the plane's middle, or anywhere if that is 0. It may lie ``off`` sides off the plane per
+    radian.
+    """
     nearest = REACH * maps.cells_per_texel
-    allowed = off * largest_turn * maps.cells_per_texel
+    allowed = off * maps.largest_turn * maps.cells_per_texel
     found = Neighbour()
     for k in range(maps.start[texel], maps.start[texel + 1]):
         other = maps.planes[k]
-        apart = other.middle - middle
-        height = wp.dot(normal, apart)
-        cosine = wp.dot(normal, other.normal)
+        apart = other.middle - plane.middle
+        height = wp.dot(plane.normal, apart)
+        cosine = wp.dot(plane.normal, other.normal)
         if wp.abs(height) < nearest and cosine > 0.0 and wp.dot(apart, ahead) >= AHEAD * wp.dot(ahead, ahead):
             nearest = wp.abs(height)
-            fits = 1.0 - cosine * cosine <= largest_turn * largest_turn and nearest <= allowed
-            found.follows = wp.where(fits, 1, -1)
+            fits = 1.0 - cosine * cosine <= maps.largest_turn * maps.largest_turn and nearest <= allowed
+            found.is_there = wp.where(fits, GOES_ON, TURNS_AWAY)
             found.height = height
     found.is_beside = True
     return found
 
 
 @wp.func
-def neighbour_elsewhere(
-    maps: PatchMap, axis: int, middle: wp.vec3, normal: wp.vec3, ahead: wp.vec3, largest_turn: float
-) -> Neighbour:
+def neighbour_elsewhere(maps: PatchMap, axis: int, plane: PatchPlane, ahead: wp.vec3) -> Neighbour:
     """The patch that one of the other two maps holds near the point ``ahead`` of a plane's middle."""
     found = Neighbour()
-    point = (middle + ahead) / maps.cells_per_texel
+    point = (plane.middle + ahead) / maps.cells_per_texel
     for k in range(1, 3):
         other = (axis + k) % 3
         columns, rows = maps.size[(other + 1) % 3], maps.size[(other + 2) % 3]
@@ -133,12 +107,30 @@ def neighbour_elsewhere(
         first_v = int(wp.floor(point[(other + 2) % 3] - 0.5))
         for v in range(wp.max(first_v, 0), wp.min(first_v + 2, rows)):
             for u in range(wp.max(first_u, 0), wp.min(first_u + 2, columns)):
-                if found.follows <= 0:
+                if found.is_there != GOES_ON:
                     texel = maps.first_texel[other] + v * columns + u
-                    there = neighbour_of(maps, middle, normal, ahead, texel, largest_turn, OFF_ELSEWHERE)
-                    if there.follows != 0:
+                    there = nearest_in_texel(maps, plane, ahead, texel, OFF_ELSEWHERE)
+                    if there.is_there != NONE:
                         found = there
     found.is_beside = False
+    return found
+
+
+@wp.func
+def neighbour_towards(maps: PatchMap, axis: int, texel: wp.vec2i, step: wp.vec2i, plane: PatchPlane) -> Neighbour:
+    """What goes on from a patch: the next texel of its own map if that holds a patch, else another map."""
+    columns, rows = maps.size[(axis + 1) % 3], maps.size[(axis + 2) % 3]
+    u, v = texel[0] + step[0], texel[1] + step[1]
+    found = Neighbour()
+    if u >= 0 and u < columns and v >= 0 and v < rows:
+        beside = maps.first_texel[axis] + v * columns + u
+        found = nearest_in_texel(maps, plane, wp.vec3(0.0), beside, OFF_BESIDE)
+    if found.is_there == NONE:
+        du, dv = float(step[0]), float(step[1])
+        normal = plane.normal
+        rise = -(du * normal[(axis + 1) % 3] + dv * normal[(axis + 2) % 3]) / normal[axis]
+        ahead = maps.cells_per_texel * point_from_texel(axis, wp.vec3(du, dv, rise))
+        found = neighbour_elsewhere(maps, axis, plane, ahead)
     return found
 
 
@@ -146,61 +138,43 @@ def neighbour_elsewhere(
 def sort_patches(
     first: int,
     # In:
-    patches: wp.array(dtype=Piece),
+    patches: wp.array(dtype=Patch),
     texel: wp.array(dtype=wp.int32),
     start: wp.array(dtype=wp.int32),
     ranks: wp.array(dtype=wp.int32),
     # Out:
-    patches_out: wp.array(dtype=Piece),
+    patches_out: wp.array(dtype=Patch),
     planes_out: wp.array(dtype=PatchPlane),
     texel_out: wp.array(dtype=wp.int32),
 ):
+    """A thread puts one patch into its place in its texel."""
     i = first + wp.tid()
     place = start[texel[i]] + ranks[i]
-    piece = patches[i]
+    patch = patches[i]
     plane = PatchPlane()
-    plane.middle = piece.corner + 0.5 * (piece.edge_u + piece.edge_v)
-    plane.normal = wp.normalize(wp.cross(piece.edge_u, piece.edge_v))
-    patches_out[place] = piece
+    plane.middle = patch_middle(patch)
+    plane.normal = patch_normal(patch)
+    patches_out[place] = patch
     planes_out[place] = plane
     texel_out[place] = texel[i]
 
 
-@wp.func
-def neighbour_onwards(
-    maps: PatchMap, axis: int, texel: wp.vec2i, way: wp.vec2i, middle: wp.vec3, normal: wp.vec3, largest_turn: float
-) -> Neighbour:
-    """The patch a texel further in a patch's map, where there is none in another map."""
-    columns, rows = maps.size[(axis + 1) % 3], maps.size[(axis + 2) % 3]
-    u, v = texel[0] + way[0], texel[1] + way[1]
-    found = Neighbour()
-    if u >= 0 and u < columns and v >= 0 and v < rows:
-        beside = maps.first_texel[axis] + v * columns + u
-        found = neighbour_of(maps, middle, normal, wp.vec3(0.0), beside, largest_turn, OFF_BESIDE)
-    if found.follows == 0:
-        du, dv = float(way[0]), float(way[1])
-        rise = -(du * normal[(axis + 1) % 3] + dv * normal[(axis + 2) % 3]) / normal[axis]
-        ahead = maps.cells_per_texel * point_from_texel(axis, wp.vec3(du, dv, rise))
-        found = neighbour_elsewhere(maps, axis, middle, normal, ahead, largest_turn)
-    return found
-
-
 @kernel
-def find_doubts(
+def compare_with_neighbours(
     first: int,
     # In:
     maps: PatchMap,
-    largest_turn: float,
     # Out, per patch: 1 for a doubtful one; the mean height of the surface over it, cells; the sum of the squares of the
-    # surface's turns along its two sides
+    # surface's turns along its two sides, radians
     doubtful_out: wp.array(dtype=wp.uint8),
     rise_out: wp.array(dtype=float),
     turn_out: wp.array(dtype=float),
     # Out: 1 for doubtful cells, the same value from whoever writes
     cell_out: wp.array(dtype=wp.uint8),
 ):
+    """A thread compares one patch with its four neighbours."""
     i = first + wp.tid()
-    middle, normal = maps.planes[i].middle, maps.planes[i].normal
+    plane = maps.planes[i]
     number = maps.texel[i]
     axis = wp.where(number < maps.first_texel[1], 0, wp.where(number < maps.first_texel[2], 1, 2))
     columns = maps.size[(axis + 1) % 3]
@@ -209,13 +183,13 @@ def find_doubts(
     rise = float(0.0)
     squares = float(0.0)
     for side in range(2):
-        way = wp.vec2i(1 - side, side)
-        ahead = neighbour_onwards(maps, axis, texel, way, middle, normal, largest_turn)
-        behind = neighbour_onwards(maps, axis, texel, -way, middle, normal, largest_turn)
-        doubtful = doubtful or ahead.follows <= 0 or behind.follows <= 0
-        # What is in another map lies elsewhere in it: the other side alone tells the turn.
-        weight_ahead = wp.where(ahead.follows != 0 and ahead.is_beside, 1.0, 0.0)
-        weight_behind = wp.where(behind.follows != 0 and behind.is_beside, 1.0, 0.0)
+        step = wp.vec2i(1 - side, side)
+        ahead = neighbour_towards(maps, axis, texel, step, plane)
+        behind = neighbour_towards(maps, axis, texel, -step, plane)
+        doubtful = doubtful or ahead.is_there != GOES_ON or behind.is_there != GOES_ON
+        # A patch of another map lies elsewhere in its texel: the neighbour on the other side alone tells the turn.
+        weight_ahead = wp.where(ahead.is_there != NONE and ahead.is_beside, 1.0, 0.0)
+        weight_behind = wp.where(behind.is_there != NONE and behind.is_beside, 1.0, 0.0)
         weights = wp.max(weight_ahead + weight_behind, 1.0)
         turn = 2.0 * (weight_ahead * ahead.height + weight_behind * behind.height) / weights
         rise += RISE_PER_TURN * turn
@@ -224,11 +198,9 @@ def find_doubts(
     rise_out[i] = rise
     turn_out[i] = squares / (maps.cells_per_texel * maps.cells_per_texel)
     if doubtful:
-        box = cells_of_patch(maps.cells, maps.patches[i])
-        for z in range(box.first[2], box.last[2] + 1):
-            for y in range(box.first[1], box.last[1] + 1):
-                for x in range(box.first[0], box.last[0] + 1):
-                    cell_out[number_of_cell(maps.cells, x, y, z)] = wp.uint8(1)
+        box = cells_of_patch(maps.patches[i], maps.cells)
+        for k in range(cell_count(box)):
+            cell_out[cell_number(cell_of_box(box, k), maps.cells)] = wp.uint8(1)
 
 
 @kernel
@@ -238,107 +210,141 @@ def raise_patches(
     planes: wp.array(dtype=PatchPlane),
     rise: wp.array(dtype=float),
     # In, out:
-    patches: wp.array(dtype=Piece),
+    patches: wp.array(dtype=Patch),
 ):
+    """A thread moves one patch to the mean height of the surface over it."""
     i = first + wp.tid()
     patches[i].corner = patches[i].corner + rise[i] * planes[i].normal
 
 
 @kernel
-def find_near(
+def mark_near(
     first: int,
     # In:
     doubtful: wp.array(dtype=wp.uint8),
     cells: wp.vec3i,
-    # Out: 1 for cells beside a doubtful one, and for those
+    # Out: 1 for doubtful cells and those beside them, the same value from whoever writes
     near_out: wp.array(dtype=wp.uint8),
 ):
+    """A thread marks the cells about one cell, if that is doubtful."""
     i = first + wp.tid()
     if doubtful[i] == wp.uint8(0):
         return
-    x, y, z = i % cells[0], (i / cells[0]) % cells[1], i / (cells[0] * cells[1])
-    for z_beside in range(wp.max(z - 1, 0), wp.min(z + 2, cells[2])):
-        for y_beside in range(wp.max(y - 1, 0), wp.min(y + 2, cells[1])):
-            for x_beside in range(wp.max(x - 1, 0), wp.min(x + 2, cells[0])):
-                near_out[number_of_cell(cells, x_beside, y_beside, z_beside)] = wp.uint8(1)
+    box = cells_about(wp.vec3i(i % cells[0], (i / cells[0]) % cells[1], i / (cells[0] * cells[1])), cells)
+    for k in range(cell_count(box)):
+        near_out[cell_number(cell_of_box(box, k), cells)] = wp.uint8(1)
+
+
+@wp.func
+def lies_in_doubtful_cell(patch: Patch, doubtful: wp.array(dtype=wp.uint8), cells: wp.vec3i) -> bool:
+    """Whether any of the cells in the box about a patch is doubtful; none is if the array is empty."""
+    found = bool(False)
+    if doubtful.shape[0] > 0:
+        box = cells_of_patch(patch, cells)
+        for k in range(cell_count(box)):
+            if doubtful[cell_number(cell_of_box(box, k), cells)] != wp.uint8(0):
+                found = True
+    return found
+
+
+@wp.func
+def mark_touched(patch: Patch, cells: wp.vec3i, touched_out: wp.array(dtype=wp.uint8)):
+    """Mark the cells that a patch crosses."""
+    box = cells_of_patch(patch, cells)
+    for k in range(cell_count(box)):
+        cell = cell_of_box(box, k)
+        if crosses_cell(patch, cell):
+            touched_out[cell_number(cell, cells)] = wp.uint8(1)
 
 
 @kernel
-def list_sure(
+def list_reliable(
     first: int,
     # In:
-    patches: wp.array(dtype=Piece),
+    patches: wp.array(dtype=Patch),
     doubtful: wp.array(dtype=wp.uint8),  # cells; empty: none is
     cells: wp.vec3i,
-    # Out, per chunk: patches outside doubtful cells, and their list as items; 1 for cells with one of them, the same
+    # Out, per chunk: patches outside doubtful cells, and their list as records; 1 for cells with one of them, the same
     # value from whoever writes
     count_out: wp.array(dtype=wp.int32),
     list_out: wp.array(dtype=wp.int32),
     touched_out: wp.array(dtype=wp.uint8),
 ):
+    """A thread lists the reliable ones of one chunk of patches."""
     chunk = first + wp.tid()
     begin = CHUNK * chunk
     count = int(0)
     for i in range(begin, wp.min(begin + CHUNK, patches.shape[0])):
-        box = cells_of_patch(cells, patches[i])
-        is_sure = bool(True)
-        if doubtful.shape[0] > 0:
-            for z in range(box.first[2], box.last[2] + 1):
-                for y in range(box.first[1], box.last[1] + 1):
-                    for x in range(box.first[0], box.last[0] + 1):
-                        if doubtful[number_of_cell(cells, x, y, z)] != wp.uint8(0):
-                            is_sure = False
-        if is_sure:
+        if not lies_in_doubtful_cell(patches[i], doubtful, cells):
             list_out[begin + count] = -1 - i
             count += 1
-            for z in range(box.first[2], box.last[2] + 1):
-                for y in range(box.first[1], box.last[1] + 1):
-                    for x in range(box.first[0], box.last[0] + 1):
-                        if crosses_cell(patches[i], x, y, z):
-                            touched_out[number_of_cell(cells, x, y, z)] = wp.uint8(1)
+            mark_touched(patches[i], cells, touched_out)
     count_out[chunk] = count
 
 
 @dataclass(frozen=True, eq=False)
-class Doubts:
-    """Where patches are in doubt."""
+class CheckedPatches:
+    """Patches, and which of them are doubtful."""
 
     patches: wp.array
-    """(n,) ``Piece``."""
+    """(n,) ``Patch``."""
     turn: wp.array
     """(n,) float32, the squares of the surface's turns over a patch, in radians, summed over its two axes; empty if not
     known."""
-    share: float
-    """Of all patches, those in doubt."""
-    cells: wp.array
+    doubtful_share: float
+    """Of all patches, those that are doubtful themselves."""
+    doubtful_cells: wp.array
     """(cells,) uint8, 1 for doubtful cells of the survey; empty if none is."""
-    near: wp.array
+    near_doubtful: wp.array
     """(cells,) uint8, 1 for those and the cells beside them."""
-    survey_cells: wp.vec3i
+    cells: wp.vec3i
+    """Cells of the survey along x, y and z."""
 
-    def sure_patches(self) -> tuple[wp.array, wp.array]:
-        """The patches outside doubtful cells as items, -1 for patch 0; and (cells,) uint8, 1 for their cells."""
+    def reliable(self) -> tuple[wp.array, wp.array]:
+        """The patches outside doubtful cells.
+
+        Returns:
+            records: (m,) int32, -1 for patch 0.
+            touched: (cells,) uint8, 1 for cells that one of them crosses.
+        """
         device, count = self.patches.device, self.patches.shape[0]
         counts = wp.zeros(chunk_count(count) + 1, dtype=wp.int32, device=device)
-        listed, touched = wp.empty(count, dtype=wp.int32, device=device), wp.zeros_like(self.near)
-        inputs = [self.patches, self.cells, self.survey_cells, counts, listed, touched]
-        launch_chunks(list_sure, count, inputs, device)
+        listed, touched = wp.empty(count, dtype=wp.int32, device=device), wp.zeros_like(self.near_doubtful)
+        inputs = [self.patches, self.doubtful_cells, self.cells, counts, listed, touched]
+        launch_chunks(list_reliable, count, inputs, device)
         return gather_lists(listed, counts), touched
 
 
-def no_doubts(survey: Survey) -> Doubts:
-    """All patches are good enough."""
+def unchecked(survey: Survey) -> CheckedPatches:
+    """The patches of a survey, all of them taken for reliable."""
     patches, _ = survey.patches()
     nx, ny, nz = survey.cells
-    nothing = wp.empty(0, dtype=wp.uint8, device=patches.device)
+    near = wp.zeros(nx * ny * nz, dtype=wp.uint8, device=patches.device)
+    none = wp.empty(0, dtype=wp.uint8, device=patches.device)
     unknown = wp.empty(0, dtype=float, device=patches.device)
-    return Doubts(
-        patches, unknown, 0.0, nothing, wp.zeros(nx * ny * nz, dtype=wp.uint8, device=patches.device), survey.cells
-    )
+    return CheckedPatches(patches, unknown, 0.0, none, near, survey.cells)
 
 
-def doubts_of(survey: Survey, largest_turn: float) -> Doubts:
-    """Compare every patch with its neighbours; ``largest_turn`` in radians is when they are in doubt."""
+def checked(survey: Survey, largest_turn: float) -> CheckedPatches:
+    """The patches of a survey, compared with their neighbours; ``largest_turn`` in radians makes them doubtful."""
+    maps = _patch_map(survey, largest_turn)
+    device, count = maps.patches.device, maps.patches.shape[0]
+    doubtful = wp.empty(count, dtype=wp.uint8, device=device)
+    rise, turn = (wp.empty(count, dtype=float, device=device) for _ in range(2))
+    total = survey.cells[0] * survey.cells[1] * survey.cells[2]
+    cells, near = (wp.zeros(total, dtype=wp.uint8, device=device) for _ in range(2))
+    launch(compare_with_neighbours, count, [maps, doubtful, rise, turn, cells], device)
+    launch(raise_patches, count, [maps.planes, rise, maps.patches], device)
+    share = int(np.count_nonzero(doubtful.numpy())) / count
+    if share == 0.0:
+        cells = wp.empty(0, dtype=wp.uint8, device=device)
+    else:
+        launch(mark_near, total, [cells, survey.cells, near], device)
+    return CheckedPatches(maps.patches, turn, share, cells, near, survey.cells)
+
+
+def _patch_map(survey: Survey, largest_turn: float) -> PatchMap:
+    """The patches of a survey, sorted by texel."""
     frame, (patches, texel) = survey.frame, survey.patches()
     device, count = patches.device, patches.shape[0]
     maps = PatchMap()
@@ -347,15 +353,5 @@ def doubts_of(survey: Survey, largest_turn: float) -> Doubts:
     maps.planes = wp.empty(count, dtype=PatchPlane, device=device)
     launch(sort_patches, count, [patches, texel, maps.start, ranks, maps.patches, maps.planes, maps.texel], device)
     maps.size, maps.first_texel = wp.vec3i(*frame.size), wp.vec3i(*frame.first_texels[:3])
-    maps.cells_per_texel, maps.cells = survey.cells_per_texel, survey.cells
-    doubtful = wp.empty(count, dtype=wp.uint8, device=device)
-    rise, turn = (wp.empty(count, dtype=float, device=device) for _ in range(2))
-    cell_count = survey.cells[0] * survey.cells[1] * survey.cells[2]
-    cells, near = (wp.zeros(cell_count, dtype=wp.uint8, device=device) for _ in range(2))
-    launch(find_doubts, count, [maps, largest_turn, doubtful, rise, turn, cells], device)
-    launch(raise_patches, count, [maps.planes, rise, maps.patches], device)
-    doubts = int(np.count_nonzero(doubtful.numpy()))
-    if doubts == 0:
-        return Doubts(maps.patches, turn, 0.0, wp.empty(0, dtype=wp.uint8, device=device), near, survey.cells)
-    launch(find_near, cell_count, [cells, survey.cells, near], device)
-    return Doubts(maps.patches, turn, doubts / count, cells, near, survey.cells)
+    maps.cells_per_texel, maps.cells, maps.largest_turn = survey.cells_per_texel, survey.cells, largest_turn
+    return maps

@@ -14,7 +14,7 @@ struct TreePatches : TreeTriangles {
         const Eight t = height / slope;
         const Eight x = ox + t * dx, y = oy + t * dy, z = oz + t * dz;
         // In the map of an axis u is the next coordinate, and v the one after.
-        const Eight axis = load(r + PATCH_KIND * LANES);
+        const Eight axis = load(r + PATCH_AXIS_ROW * LANES);
         const EightFlags is_x = axis < eight(1.0f), is_y = axis < eight(2.0f);
         const Eight u = chosen(is_x, y, chosen(is_y, z, x)) - load(r + 4 * LANES);
         const Eight v = chosen(is_x, z, chosen(is_y, x, y)) - load(r + 5 * LANES);

@@ -20,9 +20,6 @@ struct TreeRays : Vectors {
         LANES = 8,
         NODE = TREE_NODE,          // floats of a node: per axis eight lows, then eight highs; then eight children
         CHILDREN = 6 * LANES,      // where the children begin
-        TRIANGLE_NUMBER = 9,       // row of a triangle's number, after its three corners
-        PATCH_NUMBER = 6,          // row of a patch's triangle, after its plane and the middle of its texel
-        PATCH_KIND = 7,            // row of the axis of a patch's map
 #if defined(__CUDA_ARCH__)
         BLOCK = 1,
 #else

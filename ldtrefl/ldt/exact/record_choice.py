@@ -2,7 +2,7 @@
 
 Patches stand for triangles where that pays and is right, and the survey of them is made only where it may:
 
-    a sample of triangles -> survey -> doubts, and the expected error -> bytes -> patches
+    a sample of triangles -> survey -> doubtful patches, and the expected error -> bytes -> patches
                                        (too far off: once more with smaller patches)
 
 *Pays*: they save two thirds of the bytes. In the tree a triangle takes 53 to 58 bytes and a patch 47. A quarter of the
@@ -23,18 +23,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 import warp as wp
 
-from ldtrefl.ldt.exact.patch_check import doubts_of, no_doubts
-from ldtrefl.ldt.exact.patches import PATCH_MARGIN, Survey
+from ldtrefl.ldt.exact.patch_check import CheckedPatches, checked, unchecked
+from ldtrefl.ldt.exact.patches import PATCH_MARGIN
+from ldtrefl.ldt.exact.sample import Sample
+from ldtrefl.ldt.exact.survey import Survey
+from ldtrefl.ldt.options import Quality
 from ldtrefl.ldt.texel_frame import TexelFrame, texel_frame
-from ldtrefl.scene.mesh import Mesh
 from ldtrefl.world.device_mesh import DeviceMesh
-
-Quality = Literal["fast", "balanced", "exact"]
 
 SURVEY_CELLS = 128
 """Cells along the longest side, at most, in which patches and triangles are told apart."""
@@ -53,8 +52,7 @@ rays are wrong. Large patches leave slits where two maps meet: with 0.9, of 200,
 that faced them, with 0.75 16. In trusted maps it is 0: on a rough surface, where normals go to and fro, it would leave
 holes."""
 LARGEST_TURN: dict[Quality, float] = {"fast": 0.8, "balanced": 0.4}
-"""Radians between neighbouring patches from which they are in doubt, see ``doubts.py``: the mean does not know a bad
-few."""
+"""Radians between neighbouring patches from which they are doubtful, see ``patch_check.py``: a mean hides a bad few."""
 LARGEST_ERROR: dict[Quality, float] = {"fast": 0.008, "balanced": 0.00095}
 """Share of rays that may be expected to be wrong."""
 ERROR_OF_TURN = 0.1
@@ -75,16 +73,12 @@ FEW_TRIANGLES = 50_000
 FEWEST_TRIANGLES = 2_000
 """The same in maps that are trusted: fewer take no more room than patches."""
 
-SAMPLE = 1024
-"""Triangles that are looked at before any survey."""
 SAMPLED_DENSE = 0.8
 """Of ``DENSE``, from which the sample allows a survey: it gave 0.85 to 0.95 of what the survey counts."""
 SAMPLED_ERROR = 6.0
 """Times the largest error up to which the sample allows a survey. The sample's was 0.5 to 1.7 times the survey's on
 smooth meshes, ten times that on rough ones; and what is three times too far off can still become right with patches of
 half the side."""
-FEWEST_PAIRS = 64
-"""Pairs of neighbours in the sample that tell of a surface's turns; of fewer nothing is said."""
 TRIES = 3
 """Surveys with smaller and smaller patches; most often the second is the last."""
 SMALLER = 0.95
@@ -93,39 +87,41 @@ FEWER_KEPT = 0.7
 """Of the side of patches that are right, what is tried if they leave too many triangles."""
 MOST_KEPT = 0.5
 """Share of triangles kept up to which smaller patches are tried."""
-MOST_DOUBTS = 0.12
-"""Share of patches in doubt from which half the triangles and more are kept, so that they need not be counted."""
+MOST_DOUBTFUL = 0.12
+"""Share of doubtful patches from which half the triangles and more are kept, so that they need not be counted."""
 
 HORIZON = 1.0 / 3.0
-"""Of a patch's side, how far past a doubted hit a search goes on."""
+"""Of a patch's side, how far past a doubtful hit a search goes on."""
 
 
 @dataclass(frozen=True, eq=False)
-class MixedRecords:
+class PatchRecords:
     """Patches, and the triangles that none stands for."""
 
-    items: wp.array
-    """(n,) int32: triangles from 0, below 0 patches: -1 is patch 0."""
+    numbers: wp.array
+    """(n,) int32, the records: triangles from 0 on; below 0 patches, -1 for patch 0."""
     patches: wp.array
-    """(m,) ``Piece``, in cells of the survey: ``cells_per_texel`` times the texels of ``frame``."""
+    """(m,) ``Patch``, in cells of the survey: ``cells_per_texel`` times the texels of ``frame``."""
     frame: TexelFrame
     """The box of texels whose side is a patch's."""
     cells_per_texel: float
     half_patch: float
     """Half the side of a patch in its map, texels of ``frame``."""
     horizon: float
-    """Texels past a doubted hit from which a search goes on."""
+    """How far past a doubtful hit a search goes on, texels of ``frame``."""
     front: int
     """The side of the records that can be seen from outside, 1 or -1 along their normals; 0 if not known."""
 
 
 def choose_records(
     geometry: DeviceMesh, resolution: int, quality: Quality, *, trusted: bool = False
-) -> MixedRecords | None:
-    """What stands for a mesh's triangles at a resolution, or None: all triangles are kept.
+) -> PatchRecords | None:
+    """What stands for a mesh's triangles; None if all triangles are kept.
 
-    ``exact`` keeps them always. In ``trusted`` maps, whose texels are smaller than what can be seen, patches need not
-    be right, and stand for smaller meshes, too.
+    Args:
+        resolution: texels along the mesh's longest side.
+        quality: ``"exact"`` keeps all triangles.
+        trusted: texels are smaller than what can be seen: patches need not be right, and stand for smaller meshes, too.
     """
     triangles = len(geometry.faces)
     few = FEWEST_TRIANGLES if trusted else FEW_TRIANGLES
@@ -154,83 +150,35 @@ def pays(triangles: int, patches: float, kept: int) -> bool:
     return after <= (1.0 - WORTH_SAVING) * before
 
 
-class Sample:
-    """A few triangles of a mesh, and those that follow them in the file.
-
-    Args:
-        mesh: in any order.
-        side: of a patch, in lengths of the mesh's longest side.
-    """
-
-    def __init__(self, mesh: Mesh, side: float) -> None:
-        self._length = 2.0 * side  # in unit space, where no area leaves float64's range
-        self._mesh = mesh
-        first = np.linspace(0, len(mesh.faces) - 2, SAMPLE).astype(np.int64)
-        self._faces, self._next = mesh.faces[first], mesh.faces[first + 1]
-        self._corners = self._corners_of(self._faces)
-        self._normal, self._area = _facet(self._corners)
-        extent = (self._corners.max(axis=1) - self._corners.min(axis=1)).max(axis=1)
-        self._is_small = extent <= 2.0 * self._length
-        surface = float(self._area[self._is_small].sum()) / self._length**2
-        self.density = np.count_nonzero(self._is_small) / surface if surface > 0.0 else 0.0
-        """Small triangles per patch of their surface; 0 if they have none, as nothing can stand for them."""
-
-    def _corners_of(self, faces: np.ndarray) -> np.ndarray:
-        centre, half = self._mesh.unit_frame
-        return (self._mesh.vertices[faces] - centre) / half
-
-    def longest_edge(self) -> float:
-        """Of small triangles, in sides of a patch; the mean over their surface."""
-        edges = np.linalg.norm(self._corners - np.roll(self._corners, 1, axis=1), axis=2).max(axis=1)
-        return float(np.average(edges[self._is_small], weights=self._area[self._is_small])) / self._length
-
-    def turn(self) -> float:
-        """The mean square of the surface's turn along a patch, summed over both axes, from neighbours that follow each
-        other in the file; 0 if too few do."""
-        are_joined = np.count_nonzero(self._faces[:, :, None] == self._next[:, None, :], axis=(1, 2)) == 2
-        are_joined &= self._is_small & (self._area > 0.0)
-        if np.count_nonzero(are_joined) < FEWEST_PAIRS:
-            return 0.0
-        here, there = self._corners[are_joined], self._corners_of(self._next[are_joined])
-        normal = self._normal[are_joined]
-        other, _ = _facet(there)
-        angle = np.arctan2(np.linalg.norm(np.cross(normal, other), axis=1), (normal * other).sum(axis=1))
-        apart = np.linalg.norm(here.mean(axis=1) - there.mean(axis=1), axis=1)
-        turn = np.minimum(angle * self._length / np.maximum(apart, self._length * 1e-6), 1.0)
-        return 2.0 * float(np.average(turn**2, weights=self._area[are_joined]))
-
-
-def _facet(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(n, 3) normals, of twice the area, and (n,) areas of triangles of (n, 3, 3) corners."""
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return normal, 0.5 * np.linalg.norm(normal, axis=1)
-
-
 def _surveyed(
     geometry: DeviceMesh, resolution: int, side: float, quality: Quality, edge: float, *, trusted: bool = False
-) -> tuple[MixedRecords | None, float]:
-    """(records with patches of ``side`` texels, or None if they do not pay or are not right; the side of smaller ones
-    that may, or 0) for triangles whose longest edge is ``edge`` texels."""
+) -> tuple[PatchRecords | None, float]:
+    """Survey a mesh for patches of ``side`` texels; its triangles' longest edge is ``edge`` texels.
+
+    Returns:
+        records: None if patches do not pay or are not right.
+        smaller: the side of smaller patches that may pay and be right; 0 if there is none.
+    """
     triangles = len(geometry.faces)
     frame = texel_frame(geometry.mesh, max(1, round(resolution / side)))
     cells = max(1, min(SURVEY_CELLS, round(SURVEY_CELLS_PER_PATCH * max(frame.size))))
     survey = Survey(geometry, frame, cells, 0.0 if trusted else FACING_MOST[quality])
     if survey.count == 0 or not _may_pay(survey, survey.count, quality):
         return None, 0.0
-    doubts = no_doubts(survey) if trusted else doubts_of(survey, LARGEST_TURN[quality])
-    if doubts.share > MOST_DOUBTS:
+    found = unchecked(survey) if trusted else checked(survey, LARGEST_TURN[quality])
+    if found.doubtful_share > MOST_DOUBTFUL:
         return None, 0.0
-    patches, touched = doubts.sure_patches()
-    kept = survey.kept_triangles(touched, doubts.near)
+    reliable, touched = found.reliable()
+    kept = survey.kept_triangles(touched, found.near_doubtful)
     # Between facets that are wider than patches a turn is as large as from one facet to the next.
     facets = max(1.0, edge / side) ** 2
-    allowed, squares = LARGEST_ERROR[quality] / facets, doubts.turn.numpy()
-    is_right = trusted or _expected_error(survey, squares[-1 - patches.numpy()], squares.size) <= allowed
-    if is_right and pays(triangles, patches.shape[0], kept.shape[0]):
-        return _mixed(survey, doubts.patches, patches, kept), 0.0
+    allowed, squares = LARGEST_ERROR[quality] / facets, found.turn.numpy()
+    is_right = trusted or _expected_error(survey, squares[-1 - reliable.numpy()], squares.size) <= allowed
+    if is_right and pays(triangles, reliable.shape[0], kept.shape[0]):
+        return _records(survey, found, reliable, kept), 0.0
     if trusted or kept.shape[0] > MOST_KEPT * triangles:
         return None, 0.0
-    # What is in doubt now may be right then.
+    # What is doubtful now may be right with smaller patches.
     error = _expected_error(survey, np.minimum(squares, LARGEST_TURN[quality] ** 2), squares.size)
     shrink = SMALLER * math.sqrt(allowed / max(error, allowed))
     if is_right:  # but too many triangles are kept
@@ -251,10 +199,11 @@ def _expected_error(survey: Survey, squares: np.ndarray, count: int) -> float:
     return share if survey.front else OPEN * share
 
 
-def _mixed(survey: Survey, made: wp.array, patches: wp.array, kept: wp.array) -> MixedRecords:
-    items = wp.empty(patches.shape[0] + kept.shape[0], dtype=wp.int32, device=patches.device)
-    wp.copy(items, patches)
+def _records(survey: Survey, found: CheckedPatches, reliable: wp.array, kept: wp.array) -> PatchRecords:
+    """Reliable patches, and the triangles that are kept."""
+    numbers = wp.empty(reliable.shape[0] + kept.shape[0], dtype=wp.int32, device=reliable.device)
+    wp.copy(numbers, reliable)
     if kept.shape[0] > 0:
-        wp.copy(items, kept, dest_offset=patches.shape[0])
+        wp.copy(numbers, kept, dest_offset=reliable.shape[0])
     half = 0.5 + float(PATCH_MARGIN)
-    return MixedRecords(items, made, survey.frame, survey.cells_per_texel, half, HORIZON, survey.front)
+    return PatchRecords(numbers, found.patches, survey.frame, survey.cells_per_texel, half, HORIZON, survey.front)

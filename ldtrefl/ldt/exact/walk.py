@@ -11,7 +11,7 @@ import warp as wp
 from ldtrefl.device.native_sources import native_body
 from ldtrefl.geometry.triangle import barycentrics_at
 from ldtrefl.geometry.vectors import as_single, point_along
-from ldtrefl.ldt.exact.tree import NODE, STACK, TreeView
+from ldtrefl.ldt.exact.tree import NODE, PATCH_AXIS_ROW, PATCH_TRIANGLE_ROW, STACK, TRIANGLE_NUMBER_ROW, TreeView
 from ldtrefl.tracing.hit import Hit
 from ldtrefl.tracing.outlier_hits import add_outliers_met, is_outlier_met, merge_outliers
 from ldtrefl.tracing.tracer import RAY_BLOCK, Query, Tracer
@@ -81,8 +81,11 @@ CONSTANTS: dict[str, float | int] = {
     "OWN_RISE": OWN_RISE,
     "OWN_STEP": OWN_STEP,
     "PACKET_SPREAD": PACKET_SPREAD,
+    "PATCH_AXIS_ROW": PATCH_AXIS_ROW,
+    "PATCH_TRIANGLE_ROW": PATCH_TRIANGLE_ROW,
     "RAY_BLOCK": RAY_BLOCK,
     "START_ROUNDING": START_ROUNDING,
+    "TRIANGLE_NUMBER_ROW": TRIANGLE_NUMBER_ROW,
     "TREE_NODE": NODE,
     "TREE_STACK": STACK,
     "T_ROUNDING": T_ROUNDING,

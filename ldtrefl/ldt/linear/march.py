@@ -1,8 +1,8 @@
 """Ray against sorted maps: ``march_linear``, the search of Zhang, Hsieh and Shen, sections 3.3 and 3.4.
 
-Enter the box, step along the ray at equal distances until a sample lies inside the object, then bisect between the last
-two samples; in up to three maps, chosen by the signs of the direction. Where it differs from the paper, because real
-meshes are open, nested and seen from within:
+The ray enters the box and steps along it at equal distances until a sample lies inside the object. Then the step
+between the last two samples is bisected. That is done in up to three maps, chosen by the signs of the direction. Where
+it differs from the paper, because real meshes are open, nested and seen from within:
 
 - *Inside* is more fragments that lead in than out in front of the sample, which is the paper's test of front and back
   depths and holds for solids in solids and for faces that lie in each other. Where a texel's fragments do not cancel
@@ -16,11 +16,11 @@ Samples ``i = 1 .. n`` lie at ``t_enter + i * (t_exit - t_enter) / n``. ``n`` is
 one for each texel that the ray passes: the texels of that way along x, y and z together, rounded up, and at least as
 many as lie along the longest side.
 
-Most samples are never looked at: ``march_linear.h`` goes from one that can matter to the next, by the fragments of a
-texel and by the cells that the maps agree about (``occupancy.py``). The answer has the same bits as if all were, and
+Most samples are never looked at: the C++ (``march.h``) goes from one that can matter to the next, by the fragments of
+a texel and by the cells that the maps agree about (``occupancy.py``). The answer has the same bits as if all were, and
 time follows what is near the ray, not the number of samples. ``steps`` counts the samples that were looked at.
 
-Limits: what is thinner than a step or lies between texel centres can be missed; silhouettes are blocks of a texel.
+Limits: what is thinner than a step or lies between texel centres can be missed. Silhouettes are as coarse as texels.
 """
 
 from __future__ import annotations
@@ -28,10 +28,11 @@ from __future__ import annotations
 import warp as wp
 
 from ldtrefl.device.native_sources import native_body
+from ldtrefl.geometry.box import box_span
 from ldtrefl.geometry.triangle import barycentrics_at
 from ldtrefl.geometry.vectors import as_double, as_single, point_along
-from ldtrefl.ldt.fragments import ONE_A_TEXEL, LdtView, triangle_of
 from ldtrefl.ldt.linear.occupancy import LEVEL_SHIFT
+from ldtrefl.ldt.maps import ONE_A_TEXEL, MapsView, triangle_of
 from ldtrefl.tracing.hit import Hit, no_hit
 from ldtrefl.tracing.tracer import Query, Tracer
 from ldtrefl.world.unit_rays import NEAR, distance_passed
@@ -50,22 +51,21 @@ DEEP = 2.0
 CLEARANCE = wp.constant(2.5)
 """Texels above its surface at which a ray starts that leaves it: a texel is a block, and in it a ray is inside."""
 
-
 SLACK = 2.0e-6
-"""Of the coordinates of a ray and its box, by how much less far a stretch is taken to reach: 32 roundings of a float32,
-where a sample's place is off by four and the number of a sample by as many."""
+"""By how much less far a stretch without change is taken to reach, relative to the coordinates of the ray and its box:
+32 roundings of a float32. A sample's place is off by four of them, and the number of a sample by as many."""
 
 SLOWEST = 1.0e-12
-"""Texels a sample: of a ray that is slower along an axis the number of samples to a texel would overflow."""
+"""Texels per sample along an axis, at least: of a slower ray the number of samples to the next texel would overflow."""
 
 NEVER = 1.0e9
-"""A number of a sample that no ray has."""
+"""In place of the number of a sample: more than any ray has."""
 
 ROUNDED_UP = 1.000001
-"""What lies before a limit by more than this lies before it whatever the rounding of a ray's last sample."""
+"""A hit whose t times this lies before a limit lies before it whatever the rounding of a ray's last sample."""
 
 FEW = 8
-"""Fragments that are counted faster one by one than by halves."""
+"""Fragments up to which looking at one after another is faster than halving their number."""
 
 
 @wp.struct
@@ -78,21 +78,10 @@ class Crossing:
 
 
 @wp.func
-def box_span(size: wp.vec3i, origin: wp.vec3, direction: wp.vec3) -> wp.vec2:
-    """Slab test: where the ray enters and leaves the box, from 0 on; empty if the first is the larger."""
-    t_enter = float(0.0)
-    t_exit = float(wp.inf)
-    for axis in range(3):
-        low, high = -BOX_MARGIN, float(size[axis]) + BOX_MARGIN
-        if direction[axis] == 0.0:
-            # 0 * inf would be NaN: a ray along the slab is inside it or never.
-            if origin[axis] < low or origin[axis] > high:
-                t_exit = -1.0
-        else:
-            t_low, t_high = (low - origin[axis]) / direction[axis], (high - origin[axis]) / direction[axis]
-            t_enter = wp.max(t_enter, wp.min(t_low, t_high))
-            t_exit = wp.min(t_exit, wp.max(t_low, t_high))
-    return wp.vec2(t_enter, t_exit)
+def widened_span(size: wp.vec3i, origin: wp.vec3, direction: wp.vec3) -> wp.vec2:
+    """Where a ray enters and leaves the box of texels, a little widened (``geometry/box.py``)."""
+    high = wp.vec3(float(size[0]) + BOX_MARGIN, float(size[1]) + BOX_MARGIN, float(size[2]) + BOX_MARGIN)
+    return box_span(wp.vec3(-BOX_MARGIN, -BOX_MARGIN, -BOX_MARGIN), high, origin, direction)
 
 
 CONSTANTS: dict[str, float | int] = {
@@ -106,8 +95,9 @@ CONSTANTS: dict[str, float | int] = {
     "SLACK": SLACK,
     "SLOWEST": SLOWEST,
 }
-FILES = ("ldt/linear/march.h",)
-"""What native functions here are made of."""
+"""What the C++ reads, by the names that it has there."""
+FILES = ("ldt/linear/sorted_maps.h", "ldt/linear/samples.h", "ldt/linear/march.h")
+"""The C++ of the search, each file after those that its class is derived from."""
 
 SEARCH = """
 const auto& view = views.data[index];
@@ -134,12 +124,12 @@ union Bits { int number; float bits; };
 const Bits fragment = {found.fragment}, looks = {steps};
 return {found.t, fragment.bits, looks.bits};
 """
-"""The call into ``march_linear.h``."""
+"""C++: the call into ``march.h``."""
 
 
 @wp.func_native(native_body(CONSTANTS, FILES, SEARCH))
 def search_maps(
-    views: wp.array(dtype=LdtView),
+    views: wp.array(dtype=MapsView),
     index: int,
     origin: wp.vec3,
     direction: wp.vec3,
@@ -154,7 +144,7 @@ def search_maps(
 
 @wp.func
 def march_linear(
-    views: wp.array(dtype=LdtView), index: int, origin: wp.vec3, direction: wp.vec3, t_max: float, any: bool
+    views: wp.array(dtype=MapsView), index: int, origin: wp.vec3, direction: wp.vec3, t_max: float, any: bool
 ) -> Crossing:
     """The paper's search, in texel space: the nearest crossing that a map confirms, before ``t_max``; any that lies
     before it, if ``any`` will do.
@@ -164,7 +154,7 @@ def march_linear(
     crossing = Crossing()
     crossing.t = float(wp.inf)
     crossing.fragment = -1
-    span = box_span(views[index].size, origin, direction)
+    span = widened_span(views[index].size, origin, direction)
     if span[0] <= span[1] and span[0] < t_max:
         found = search_maps(views, index, origin, direction, span[0], span[1], t_max, any)
         crossing.steps = wp.cast(found[2], wp.int32)
@@ -183,7 +173,7 @@ def distance_to_near(query: Query) -> float:
 
 
 @wp.func
-def closest_hit_linear(views: wp.array(dtype=LdtView), index: int, query: Query) -> Hit:
+def closest_hit_linear(views: wp.array(dtype=MapsView), index: int, query: Query) -> Hit:
     """The tracer's closest hit of a ray, by :func:`march_linear`."""
     passed = distance_to_near(query)
     origin, direction = as_single(point_along(query.origin, query.direction, passed)), query.direction
@@ -206,7 +196,7 @@ def closest_hit_linear(views: wp.array(dtype=LdtView), index: int, query: Query)
 
 
 @wp.func
-def occluded_linear(views: wp.array(dtype=LdtView), index: int, query: Query, outwards: wp.vec3) -> bool:
+def occluded_linear(views: wp.array(dtype=MapsView), index: int, query: Query, outwards: wp.vec3) -> bool:
     """The tracer's ``occluded`` by :func:`march_linear`."""
     scale = views[index].texels_per_unit
     above = query
@@ -218,7 +208,7 @@ def occluded_linear(views: wp.array(dtype=LdtView), index: int, query: Query, ou
 
 @wp.func
 def closest_hits_linear(
-    views: wp.array(dtype=LdtView), index: int, queries: wp.array(dtype=Query), count: int, hits: wp.array(dtype=Hit)
+    views: wp.array(dtype=MapsView), index: int, queries: wp.array(dtype=Query), count: int, hits: wp.array(dtype=Hit)
 ):
     """The tracer's ``closest_hits``: the maps hold all triangles, outliers too."""
     for i in range(count):
@@ -227,11 +217,11 @@ def closest_hits_linear(
 
 @wp.func
 def any_hits_linear(
-    views: wp.array(dtype=LdtView), index: int, queries: wp.array(dtype=Query), count: int, hits: wp.array(dtype=Hit)
+    views: wp.array(dtype=MapsView), index: int, queries: wp.array(dtype=Query), count: int, hits: wp.array(dtype=Hit)
 ):
     """The tracer's ``any_hits``."""
     for i in range(count):
         hits[i].triangle = wp.where(occluded_linear(views, index, queries[i], wp.vec3(0.0)), 0, -1)
 
 
-LINEAR = Tracer("linear", LdtView, closest_hits_linear, any_hits_linear, occluded_linear)
+LINEAR = Tracer("linear", MapsView, closest_hits_linear, any_hits_linear, occluded_linear)

@@ -1,13 +1,14 @@
 """What sorted maps imply about stretches of a ray, so that the linear search need not look at every sample.
 
 Behind every fragment a map says inside or outside; ``inside`` holds which. Where as many fragments of a texel face up
-as down it is inside as long as they do not cancel, elsewhere if their number up to there is odd, counted from where the
-ray comes. So where that number is odd, a ray that goes up the axis and one that goes down are told different things.
+as down, a ray is inside as long as those that it has passed do not cancel. Elsewhere it is inside if it has passed an
+odd number of them. So where a texel's number of fragments is odd, a ray that goes up the axis and one that goes down
+are told different things.
 
-*Cells* are cubes of texels, at most ``MOST_CELLS`` along a side, and stand in columns along z: a bit each, a word a
+*Cells* are cubes of texels, at most ``MOST_CELLS`` along a side. They stand in columns along z: a bit a cell, a word a
 column. Of each column there are two words: where *some* map may say inside, and where *some* map may say outside. Where
-only one of the two has its bit, the maps agree, and a ray changes nowhere in that cell. Coarser columns, 4 and 16 times
-as wide, hold what any of theirs holds (a pyramid). Where any texel's number of fragments is odd there is one such
+only one of the two has its bit set, the maps agree, and a ray changes nowhere in that cell. Coarser columns, 4 and 16
+times as wide, hold what any of theirs holds (a pyramid). If any texel's number of fragments is odd, there is one such
 occupancy for each octant of directions, else one for all. At 256 texels one takes 70 KB.
 
 All of it is derived from the maps when they are made or read, by kernels over every texel and column that write places
@@ -18,7 +19,6 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
-from typing import Any
 
 import warp as wp
 
@@ -26,10 +26,10 @@ from ldtrefl.device import launch
 from ldtrefl.ldt.texel_frame import TexelFrame
 
 INSIDE_UP, INSIDE_DOWN = wp.constant(1), wp.constant(2)
-"""Bits of ``inside``: what a ray is told that goes up, or down, the map's axis."""
+"""Bits of ``inside``: whether a ray that goes up, or down, the map's axis is inside behind the fragment."""
 
 MOST_CELLS = 64
-"""Along a side: as many as a word has bits. With half as many a search at 256 takes 12% longer."""
+"""Cells along a side: as many as a word has bits. With half as many a search at 256 takes 12% longer."""
 
 SMALLEST_SHIFT = 2
 """A cell is at least 2 to this power texels wide: coarse maps have small ones."""
@@ -38,9 +38,10 @@ LEVEL_SHIFT = 2
 """Columns of a level are 2 to this power as wide as those of the one below."""
 
 COARSER = wp.constant(1 << LEVEL_SHIFT)
+"""Columns of a level along a side of one of the next."""
 
 OCTANTS = 8
-"""Of directions: bit ``a`` of their number is set where a ray goes down axis ``a``."""
+"""Octants of directions: bit ``a`` of an octant's number is set where a ray goes down axis ``a``."""
 
 MAY_BE_INSIDE, MAY_BE_OUTSIDE = wp.constant(0), wp.constant(1)
 """The two words of a column."""
@@ -56,6 +57,7 @@ def mark_inside(
     inside_out: wp.array(dtype=wp.uint8),
     odd_out: wp.array(dtype=wp.int32),  # 1 if a texel has an odd number, whoever writes it
 ):
+    """A thread marks the fragments of one texel."""
     texel = first + wp.tid()
     begin, end = start[texel], start[texel + 1]
     rising = int(0)
@@ -108,6 +110,7 @@ def mark_rows(
     # Out: the words of rows of cells along the axis, by way (up, down), v and u
     rows_out: wp.array2d(dtype=wp.uint64),
 ):
+    """A thread finds the words of one row of cells, for rays that go one way along it."""
     item = first + wp.tid()
     way = item / (frame.side * frame.side)
     columns, rows = frame.size[(axis + 1) % 3], frame.size[(axis + 2) % 3]
@@ -137,7 +140,7 @@ def mark_rows(
 
 
 @launch.kernel
-def turn_rows(
+def columns_from_rows(
     first: int,
     # In:
     axis: int,  # 0 or 1
@@ -146,6 +149,7 @@ def turn_rows(
     # Out: columns along z, by way, y and x
     columns_out: wp.array2d(dtype=wp.uint64),
 ):
+    """A thread gathers one word of a column along z from the rows along another axis."""
     item = first + wp.tid()
     number = item / 2
     kind = item % 2
@@ -163,15 +167,16 @@ def turn_rows(
 @launch.kernel
 def fill_columns(
     first: int,
-    # In: columns along z that the three maps know, by way, y and x
+    # In: the words of columns along z by each of the three maps, by way, y and x
     from_x: wp.array2d(dtype=wp.uint64),
     from_y: wp.array2d(dtype=wp.uint64),
     from_z: wp.array2d(dtype=wp.uint64),
-    count: int,  # of columns
-    columns_per_octant: int,
+    count: int,  # of the finest columns
+    columns_per_octant: int,  # of all levels
     # Out:
     cells_out: wp.array2d(dtype=wp.uint64),
 ):
+    """A thread joins what the three maps say of one word of a column, for one octant."""
     item = first + wp.tid()
     number = item / 2
     kind = item % 2
@@ -193,6 +198,7 @@ def join_columns(
     # In and out:
     cells: wp.array2d(dtype=wp.uint64),
 ):
+    """A thread joins the words of finer columns to one word of a coarser one."""
     item = first + wp.tid()
     kind = item % 2
     number = item / 2
@@ -208,7 +214,7 @@ def join_columns(
 
 @dataclass(frozen=True, eq=False)
 class Occupancy:
-    """What is derived from sorted maps; see the top of this file."""
+    """What is derived from sorted maps, as this file says at its top."""
 
     inside: wp.array
     """(fragments,) uint8: ``INSIDE_UP`` and ``INSIDE_DOWN``."""
@@ -219,24 +225,32 @@ class Occupancy:
     cell_shift: int
     """A cell is 2 to this power texels wide."""
     sides: tuple[int, ...]
-    """Columns along a side of the square in which they stand, of each level."""
+    """Of each level, columns along a side of the square in which they stand."""
 
     @property
     def nbytes(self) -> int:
         """Bytes of the arrays."""
         return int(self.inside.size + 8 * self.cells.size)
 
-    def show_in(self, view: Any) -> None:
-        """Fill the fields of an ``LdtView`` that are about this."""
-        view.inside, view.cells = self.inside, self.cells.flatten()
-        view.words_per_octant = 0 if self.octants == 1 else self.cells.size // self.octants
-        view.cell_shift, view.column_shift, view.levels = self.cell_shift, log2_up(self.sides[0]), len(self.sides)
-        firsts = [sum(n * n for n in self.sides[:level]) for level in range(3)]
-        view.first_column = wp.vec3i(*firsts)
+    @property
+    def words_per_octant(self) -> int:
+        """Words of ``cells`` that an octant has to itself; 0 if all octants share them."""
+        return 0 if self.octants == 1 else self.cells.size // self.octants
+
+    @property
+    def column_shift(self) -> int:
+        """The finest columns stand in a square that is 2 to this power wide."""
+        return log2_up(self.sides[0])
+
+    @property
+    def first_columns(self) -> tuple[int, int, int]:
+        """The first column of each of three levels; coarser levels than there are have none."""
+        squares = [side * side for side in self.sides]
+        return 0, sum(squares[:1]), sum(squares[:2])
 
 
 def log2_up(n: int) -> int:
-    """The smallest power of two that is not below n, its exponent."""
+    """The exponent of the smallest power of two that is not below n."""
     return (n - 1).bit_length()
 
 
@@ -261,7 +275,7 @@ def occupancy_of(frame: TexelFrame, start: wp.array, depth: wp.array, reference:
         columns = rows
         if axis < 2:
             columns = wp.empty_like(rows)
-            launch.launch(turn_rows, 2 * ways * side * side, [axis, rows, side, columns], device)
+            launch.launch(columns_from_rows, 2 * ways * side * side, [axis, rows, side, columns], device)
         known.append(columns)
 
     sides = tuple(side >> (LEVEL_SHIFT * level) for level in range(max(1, (column_shift + 1) // LEVEL_SHIFT)))

@@ -9,7 +9,8 @@ from stress_cases.inputs import rays_about
 import ldtrefl
 from ldtrefl.device import launch
 from ldtrefl.ldt.exact import record_choice
-from ldtrefl.ldt.exact.record_choice import Sample, choose_records, pays
+from ldtrefl.ldt.exact.record_choice import choose_records, pays
+from ldtrefl.ldt.options import Quality
 from ldtrefl.scene import shapes
 from ldtrefl.world.device_mesh import DeviceMesh
 
@@ -105,7 +106,7 @@ def test_dense_meshes_are_right_at_silhouettes(name: str) -> None:
         assert wrong <= 0.2 and missed <= 0.05 and p99 <= 0.2 and p999 <= 1.0, what
 
 
-def chosen(mesh: ldtrefl.Mesh, quality: record_choice.Quality = "balanced") -> record_choice.MixedRecords | None:
+def chosen(mesh: ldtrefl.Mesh, quality: Quality = "balanced") -> record_choice.PatchRecords | None:
     return choose_records(DeviceMesh(mesh, DEVICE), RESOLUTION, quality)
 
 
@@ -115,7 +116,7 @@ def test_patches_must_save_two_thirds_of_the_bytes() -> None:
     mesh = shapes.make("torus_knot", {"segments": [2000, 125]})
     mixed = chosen(mesh)
     assert mixed is not None
-    items = mixed.items.numpy()
+    items = mixed.numbers.numpy()
     assert len(np.unique(items)) == len(items) and items.min() >= -len(mixed.patches) and items.max() < len(mesh.faces)
     assert pays(len(mesh.faces), int((items < 0).sum()), int((items >= 0).sum()))
 
@@ -124,7 +125,7 @@ def test_patches_must_save_two_thirds_of_the_bytes() -> None:
 def test_dense_knots_stay_few_patches(segments: tuple[int, int]) -> None:
     """The number of records, and with it the time of a search, does not depend on the mesh."""
     mixed = chosen(shapes.make("torus_knot", {"segments": list(segments)}))
-    assert mixed is not None and (mixed.items.numpy() < 0).all() and len(mixed.items) < 70_000
+    assert mixed is not None and (mixed.numbers.numpy() < 0).all() and len(mixed.numbers) < 70_000
 
 
 def test_patches_are_smaller_where_limbs_are_thin() -> None:
@@ -145,27 +146,12 @@ def test_patches_are_smaller_where_limbs_are_thin() -> None:
         (lambda: refined_scan(0.3), "fast"),
     ],
 )
-def test_what_cannot_pay_is_not_surveyed(
-    mesh: object, quality: record_choice.Quality, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_cannot_pay_is_not_surveyed(mesh: object, quality: Quality, monkeypatch: pytest.MonkeyPatch) -> None:
     def survey(*_: object, **__: object) -> None:
         raise AssertionError("a survey in vain")
 
     monkeypatch.setattr(record_choice, "Survey", survey)
     assert chosen(mesh(), quality) is None
-
-
-def test_a_sample_tells_density_and_turns() -> None:
-    """A sphere of radius 1: a patch of side s turns by s about each axis, and triangles share the area alike."""
-    ball = trimesh.creation.icosphere(subdivisions=7)
-    side = 0.01
-    sample = Sample(ldtrefl.Mesh(ball.vertices, ball.faces), side)
-    assert sample.density == pytest.approx(len(ball.faces) * (2 * side) ** 2 / (4 * np.pi), rel=0.1)
-    assert sample.turn() == pytest.approx(2 * (2 * side) ** 2, rel=0.3)
-    # The same triangles in any order: density is known, turns are not.
-    order = np.random.default_rng(0).permutation(len(ball.faces))
-    mixed = Sample(ldtrefl.Mesh(ball.vertices, ball.faces[order]), side)
-    assert mixed.density == pytest.approx(sample.density, rel=0.1) and mixed.turn() == 0.0
 
 
 @pytest.mark.filterwarnings("error")

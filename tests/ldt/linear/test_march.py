@@ -8,8 +8,8 @@ import warp as wp
 
 import ldtrefl
 from ldtrefl.device import launch
-from ldtrefl.ldt.fragments import LdtView
 from ldtrefl.ldt.linear.march import march_linear
+from ldtrefl.ldt.maps import MapsView
 from ldtrefl.ldt.texture import LayeredDepthTexture
 from ldtrefl.tracing.tracer import array_of_views
 
@@ -19,7 +19,7 @@ from .reference import LinearReference
 @launch.kernel
 def march_rays(
     first: int,
-    views: wp.array(dtype=LdtView),
+    views: wp.array(dtype=MapsView),
     origins: wp.array(dtype=wp.vec3),
     directions: wp.array(dtype=wp.vec3),
     t_max: wp.array(dtype=float),
@@ -28,6 +28,7 @@ def march_rays(
     fragment_out: wp.array(dtype=int),
     steps_out: wp.array(dtype=int),
 ):
+    """A thread searches for one ray."""
     i = first + wp.tid()
     found = march_linear(views, 0, origins[i], directions[i], t_max[i], any != 0)
     t_out[i] = found.t
@@ -49,7 +50,7 @@ def marched(
     rays = [wp.array(x, dtype=wp.vec3, device=device) for x in (origins, directions)]
     t = wp.empty(n, dtype=float, device=device)
     fragment, looks = (wp.empty(n, dtype=int, device=device) for _ in range(2))
-    inputs = [array_of_views([view], LdtView, device), *rays, wp.array(t_max, dtype=float, device=device), int(any)]
+    inputs = [array_of_views([view], MapsView, device), *rays, wp.array(t_max, dtype=float, device=device), int(any)]
     launch.launch(march_rays, n, [*inputs, t, fragment, looks], device)
     return t.numpy(), fragment.numpy(), looks.numpy()
 

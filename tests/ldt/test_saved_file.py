@@ -1,4 +1,4 @@
-"""Layered depth textures saved to a file and loaded: what is wrong with a file is said in one line that names it."""
+"""A layered depth texture in a file of its own: what is wrong with a file is said in one line that names it."""
 
 import os
 import zipfile
@@ -10,6 +10,38 @@ import pytest
 import ldtrefl
 from ldtrefl.base import budget
 from ldtrefl.scene import shapes
+
+
+def test_save_and_load_round_trip(tmp_path: Path) -> None:
+    mesh = shapes.make("genus3", {"grid": 32})
+    maps = ldtrefl.peel(mesh.vertices, mesh.faces, resolution=48)
+    maps.save(tmp_path / "maps.npz")
+    again = ldtrefl.LayeredDepthTexture.load(tmp_path / "maps.npz")
+    assert again.frame == maps.frame
+    for name in ("start", "depth", "reference"):
+        np.testing.assert_array_equal(getattr(again, name).numpy(), getattr(maps, name).numpy())
+    rays = np.array([[0, 0, 3]], np.float32), np.array([[0.1, 0.1, -1]], np.float32)
+    assert again.trace(*rays).t == maps.trace(*rays).t
+    assert [path.name for path in tmp_path.iterdir()] == ["maps.npz"]
+
+
+def test_damaged_maps_are_refused(tmp_path: Path) -> None:
+    mesh = shapes.make("box")
+    path = tmp_path / "maps.npz"
+    ldtrefl.peel(mesh.vertices, mesh.faces, resolution=16).save(path)
+    whole = path.read_bytes()
+    for length in range(0, len(whole), 97):
+        path.write_bytes(whole[:length])
+        with pytest.raises(ldtrefl.InputError, match=r"maps\.npz: not a layered depth texture that can be read"):
+            ldtrefl.LayeredDepthTexture.load(path)
+    path.write_bytes(whole)
+    stored = dict(np.load(path))
+    stored["reference"] = stored["reference"] + 10**6
+    np.savez(path, **stored)
+    with pytest.raises(ldtrefl.InputError, match="damaged"):
+        ldtrefl.LayeredDepthTexture.load(path)
+    with pytest.raises(ldtrefl.InputError, match=r"none\.npz: .*No such file"):
+        ldtrefl.LayeredDepthTexture.load(tmp_path / "none.npz")
 
 
 def npz(path: Path, **changes: object) -> Path:

@@ -1,30 +1,39 @@
 """What a tree (``tree.py``) that comes from a file must satisfy before a ray may go down it.
 
 A walk reads the children of a node, the rows of a block, and the triangle that a record names, and asks none of them
-whether it is there. So all of that is checked here: every child is a later node or a block, blocks follow each other
-and fill the rows, what a ray may have to come back to fits where it is kept, boxes of no child are empty, and every
-record's triangle and axis. What is only a number, such as a corner, is not: a wrong one is missed or met in a wrong
-place, and reads nothing.
+whether it is there. So all of that is checked here: that every child is a later node or a block, that blocks follow
+each other and fill the rows, that the children which a ray may have to come back to fit on its stack, and that every
+record names a triangle of the mesh. A lane whose box is empty has no child. What is only a number, such as a corner, is
+not checked: a wrong one is missed or met in a wrong place, and reads nothing.
 """
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from ldtrefl.ldt.exact.tree import LANES, NODE, PATCH_ROWS, STACK, TRIANGLE_ROWS
+from ldtrefl.ldt.exact.tree import (
+    LANES,
+    NODE,
+    PATCH_ROWS,
+    PATCH_TRIANGLE_ROW,
+    STACK,
+    TRIANGLE_NUMBER_ROW,
+    TRIANGLE_ROWS,
+    TreeValues,
+)
 
 UNREACHED = 1.0e29
 """Sides of an empty box lie beyond this: a tenth of what a builder writes."""
 LARGEST_NUMBER = 1.0e6
 """Of a length in unit space: far more than there is."""
 SHORTEST_HORIZON = 1.0e-5
-"""Unit space: by how much a search past a doubted hit goes on at least. A patch of the finest maps is 0.0005 wide."""
+"""Unit space: by how much a search past a doubtful hit goes on at least. A patch of the finest maps is 0.0005 wide."""
+MOST_RECORDS = 2**31
+"""Records lie below this: their number is an int32."""
 
 
-def check_tree(arrays: dict[str, np.ndarray], values: dict[str, Any], triangles: int) -> None:
-    """Check what ``Tree.packed`` gave, for a mesh of so many triangles.
+def check_tree(arrays: dict[str, np.ndarray], values: TreeValues, triangles: int) -> None:
+    """Check what ``Tree.packed`` gave, for a mesh of so many triangles; the values may be of any type.
 
     Raises:
         ValueError, KeyError, TypeError: it is not sound; the message says what.
@@ -43,16 +52,18 @@ def check_tree(arrays: dict[str, np.ndarray], values: dict[str, Any], triangles:
     _check_depth(children, is_empty)
 
 
-def _check_values(values: dict[str, Any]) -> None:
-    for name in ("low", "high"):
-        _demand(len(values[name]) == 3 and all(_is_length(x) for x in values[name]), name)
-    for name in ("front", "half_patch", "horizon"):
-        _demand(_is_length(values[name]), name)
-    _demand(all(low <= high for low, high in zip(values["low"], values["high"], strict=True)), "a box inside out")
+def _check_values(values: TreeValues) -> None:
+    low, high = values["low"], values["high"]
+    for name, corner in (("low", low), ("high", high)):
+        _demand(len(corner) == 3 and all(_is_length(x) for x in corner), name)
+    _demand(_is_length(values["front"]), "front")
+    _demand(_is_length(values["half_patch"]), "half_patch")
+    _demand(_is_length(values["horizon"]), "horizon")
+    _demand(all(a <= b for a, b in zip(low, high, strict=True)), "a box inside out")
     _demand(values["front"] in (-1.0, 0.0, 1.0), "front")
     _demand(values["horizon"] >= (SHORTEST_HORIZON if values["front"] else 0.0), "horizon")
     _demand(values["half_patch"] >= 0.0, "half_patch")
-    _demand(_is_whole(values["records"]) and 0 <= values["records"] < 2**31, "records")
+    _demand(_is_whole(values["records"]) and 0 <= values["records"] < MOST_RECORDS, "records")
 
 
 def _check_blocks(children: np.ndarray, rows: np.ndarray, triangles: int, may_be_patches: bool) -> None:
@@ -63,7 +74,10 @@ def _check_blocks(children: np.ndarray, rows: np.ndarray, triangles: int, may_be
     height = np.where(is_patch, int(PATCH_ROWS), int(TRIANGLE_ROWS))
     first = np.concatenate([[0], np.cumsum(height)])
     _demand(first[-1] == len(rows) and np.array_equal(codes >> 1, first[:-1]), "blocks that do not follow each other")
-    for number, own in ((6, first[:-1][is_patch]), (9, first[:-1][~is_patch])):
+    for number, own in (
+        (int(PATCH_TRIANGLE_ROW), first[:-1][is_patch]),
+        (int(TRIANGLE_NUMBER_ROW), first[:-1][~is_patch]),
+    ):
         triangle = np.take(rows, own + number, axis=0).view(np.int32)
         # Lanes that are not used are NaN in every row, and are never met.
         is_used = ~np.isnan(np.take(rows, own, axis=0))
@@ -90,11 +104,11 @@ def _check_depth(children: np.ndarray, is_empty: np.ndarray) -> None:
     _demand(int(below_root.max() + counts[0]) <= STACK, "more to come back to than there is room for")
 
 
-def _is_whole(value: Any) -> bool:
+def _is_whole(value: object) -> bool:
     return isinstance(value, int) and not isinstance(value, bool)
 
 
-def _is_length(value: Any) -> bool:
+def _is_length(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= LARGEST_NUMBER
 
 
