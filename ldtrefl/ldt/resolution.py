@@ -1,8 +1,9 @@
 """How fine an object's maps must be for what is seen of it.
 
-Texels a fixed part of a pixel's footprint wide (``frame/footprint.py``) keep the error of reflected points below the
-pixels asked for. Shadow rays are asked of the same maps, so with shadows texels are no larger than that part of a pixel
-on what the camera sees, either.
+A pixel's *footprint* is how far apart the points are that it and its neighbour see (``frame/footprint.py``). Texels
+that are a fixed part of it wide keep the error of reflected points below the pixels that are asked for. Shadow rays are
+searched for in the same maps. So with shadows texels are no larger than that part of the footprint on what the camera
+sees, either.
 """
 
 from __future__ import annotations
@@ -24,9 +25,13 @@ def resolutions_for(
 ) -> dict[DeviceMesh, int]:
     """Mesh -> texels along its longest side for an ``error`` in pixels.
 
-    Powers of the root of 2, so that maps serve many frames. A mesh gets the finest of its objects'.
+    Resolutions are powers of the root of 2, so that maps serve many frames. A mesh gets the finest that any of its
+    objects needs.
 
     Args:
+        error: how many pixels reflected points may be off by.
+        search: name of the search.
+        scene: whose objects the footprints are on.
         footprints: number of an object -> the smallest footprint on it, device units; None where none is known.
     """
     finest: dict[DeviceMesh, int] = {}

@@ -1,4 +1,4 @@
-"""Ray against layered depth texture: the searches there are."""
+"""The searches for a ray in a layered depth texture, by name: each is a tracer."""
 
 from __future__ import annotations
 
@@ -6,4 +6,4 @@ from ldtrefl.ldt.exact.walk import EXACT
 from ldtrefl.ldt.linear.march import LINEAR
 
 TRACERS = {tracer.name: tracer for tracer in (EXACT, LINEAR)}
-"""By the name that the option ``search`` takes."""
+"""Each search by the name that the option ``search`` takes."""

@@ -20,6 +20,11 @@ from ldtrefl.scene.mesh import Mesh
 
 FACE_NAMES = ("+x", "-x", "+y", "-y", "+z", "-z")
 
+SIDE_ROUNDING = 1e-4
+"""Texels by which a side may be longer than whole texels and gain none: it may be a whole number but for rounding."""
+CELL_ROUNDING = 1e-6
+"""The same of cells that cover the box: its sides are whole texels, so their number is rounded once."""
+
 
 @wp.func
 def point_from_texel(axis: int, t: wp.vec3) -> wp.vec3:
@@ -38,12 +43,17 @@ class TexelFrame:
 
     @classmethod
     def around(cls, unit_low: np.ndarray, unit_high: np.ndarray, resolution: int) -> TexelFrame:
-        """``resolution`` texels along the longest side, as few as cover the others; the mesh in the middle."""
+        """The box of texels about a mesh, which lies in its middle.
+
+        Args:
+            unit_low: (3,) low corner of the mesh's box, unit space.
+            unit_high: (3,) its high corner.
+            resolution: texels along the longest side; along the others there are as few as cover them.
+        """
         extent = unit_high.astype(float) - unit_low
         longest = float(extent.max())
         scale = resolution / longest if longest > 0.0 else float(resolution)
-        # A side that is a whole number of texels must not gain one by rounding.
-        x, y, z = (max(1, int(np.ceil(side * scale - 1e-4))) for side in extent)
+        x, y, z = (max(1, int(np.ceil(side * scale - SIDE_ROUNDING))) for side in extent)
         middle = unit_low + extent / 2.0
         ox, oy, oz = np.array([x, y, z]) / 2.0 - middle * scale
         return cls((x, y, z), scale, (float(ox), float(oy), float(oz)))
@@ -53,8 +63,8 @@ class TexelFrame:
         return self.size[(axis + 2) % 3], self.size[(axis + 1) % 3]
 
     def cells(self, along_longest: int) -> tuple[int, int, int]:
-        """Cells along x, y and z that cover the box, cubes of which so many lie along its longest side."""
-        x, y, z = (max(1, int(np.ceil(side * along_longest / max(self.size) - 1e-6))) for side in self.size)
+        """Cells along x, y and z that cover the box: cubes, ``along_longest`` of them along its longest side."""
+        x, y, z = (max(1, int(np.ceil(side * along_longest / max(self.size) - CELL_ROUNDING))) for side in self.size)
         return x, y, z
 
     @property
@@ -65,7 +75,7 @@ class TexelFrame:
 
 
 def texel_frame(mesh: Mesh, resolution: int) -> TexelFrame:
-    """The box of texels about a mesh."""
+    """The box of texels about a mesh, ``resolution`` texels along its longest side."""
     centre, half = mesh.unit_frame
     low, high = ((bound - centre) / half for bound in mesh.bounds)
     return TexelFrame.around(low, high, resolution)

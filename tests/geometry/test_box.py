@@ -7,7 +7,7 @@ import pytest
 import warp as wp
 
 from ldtrefl.device import launch
-from ldtrefl.geometry.box import CellBox, box_span, cell_count, cell_of_box, cells_about
+from ldtrefl.geometry.box import CellBox, box_span, cell_count, cell_holding, cell_number, cell_of_box, cells_about
 
 
 @launch.kernel
@@ -137,3 +137,33 @@ def test_cells_about_a_cell_stay_in_the_grid() -> None:
     found = boxes.numpy()
     np.testing.assert_array_equal(found["first"], np.maximum(cells - 1, 0))
     np.testing.assert_array_equal(found["last"], np.minimum(cells + 1, np.array(grid) - 1))
+
+
+@launch.kernel
+def number_points(
+    first: int,
+    # In:
+    points: wp.array(dtype=wp.vec3),
+    grid: wp.vec3i,
+    # Out:
+    number_out: wp.array(dtype=int),
+):
+    """A thread finds the number of the cell that holds one point."""
+    i = first + wp.tid()
+    x, y, z = (
+        cell_holding(points[i][0], grid[0]),
+        cell_holding(points[i][1], grid[1]),
+        cell_holding(points[i][2], grid[2]),
+    )
+    number_out[i] = cell_number(wp.vec3i(x, y, z), grid)
+
+
+def test_points_are_numbered_by_the_nearest_cell() -> None:
+    device, grid = launch.resolve_device(None), (4, 5, 3)
+    points = np.random.default_rng(0).uniform(-1.0, 6.0, (500, 3)).astype(np.float32)
+    numbers = wp.empty(500, dtype=int, device=device)
+    launch.launch(
+        number_points, 500, [wp.array(points, dtype=wp.vec3, device=device), wp.vec3i(*grid), numbers], device
+    )
+    cells = np.clip(np.floor(points).astype(int), 0, np.array(grid) - 1)
+    np.testing.assert_array_equal(numbers.numpy(), np.ravel_multi_index(cells[:, ::-1].T, grid[::-1]))

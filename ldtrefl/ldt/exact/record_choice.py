@@ -1,22 +1,24 @@
 """What a mesh is searched as: its triangles, or patches (``patches.py``) and the few triangles that none stands for.
 
-Patches stand for triangles where that pays and is right, and the survey of them is made only where it may:
+Patches stand for triangles where that pays and is right. A survey for them is made only where it may be worth it:
 
     a sample of triangles -> survey -> doubtful patches, and the expected error -> bytes -> patches
                                        (too far off: once more with smaller patches)
 
-*Pays*: they save two thirds of the bytes. In the tree a triangle takes 53 to 58 bytes and a patch 47. A quarter of the
-time is saved from a fifth to an eighth of the records: with 0.36, 0.27, 0.20, 0.13 and 0.03 of them random rays took
-0.89, 0.84, 0.79, 0.82 and 0.70 of the time and mirror rays 0.86, 0.74, 0.77, 0.76 and 0.50 (a refined scan, a box, thin
-limbs, torus knots of 500,000 and 2 million triangles; one thread). So what saves the time saves the bytes, too.
+*It pays* if patches save two thirds of the bytes. In the tree a triangle takes 53 to 58 bytes and a patch 47. A quarter
+of the time is saved from a fifth to an eighth of the records on: with 0.36, 0.27, 0.20, 0.13 and 0.03 of them random
+rays took 0.89, 0.84, 0.79, 0.82 and 0.70 of the time and mirror rays 0.86, 0.74, 0.77, 0.76 and 0.50 (a refined scan, a
+box, thin limbs, torus knots of 500,000 and 2 million triangles; one thread). So what saves the time saves the bytes,
+too.
 
-*Right*: a patch is a plane. Where the surface turns by ``turn`` radians from one patch to the next, the plane is off by
-``turn / 4`` of its side at most; and of the surface's silhouettes, where rays then hit what they should miss, or miss
-it, or hit another surface of the same object, there are ``turn`` in a side. So their share goes with the mean square of
-the turns: 0.08 to 0.17 of it for random rays, from about the object and from within its box, and for mirror rays, on
-knots and tori from thick to thin, a sampled isosurface, thin limbs and scans refined by Loop's scheme, with sides of
-0.7 to 1.6 texels; half as much again on meshes that are open, where nothing is known of backs, and twice to three times
-as much for a sheet in waves, seen from its edge.
+*It is right* if few rays are expected to be wrong. A patch is a plane. Where the surface turns by ``turn`` radians from
+one patch to the next, the plane is off by at most ``turn / 4`` of its side. Rays are wrong at the surface's
+silhouettes: they hit what they should miss, or miss it, or hit another surface of the same object. Of silhouettes there
+are ``turn`` in a side. So the share of wrong rays goes with the mean square of the turns. It was 0.08 to 0.17 of that
+for random rays, from about the object and from within its box, and for mirror rays, on knots and tori from thick to
+thin, a sampled isosurface, thin limbs and scans refined by Loop's scheme, with sides of 0.7 to 1.6 texels. It was half
+as much again on meshes that are open, where nothing is known of backs, and twice to three times as much for a sheet in
+waves, seen from its edge.
 """
 
 from __future__ import annotations
@@ -38,53 +40,53 @@ from ldtrefl.world.device_mesh import DeviceMesh
 SURVEY_CELLS = 128
 """Cells along the longest side, at most, in which patches and triangles are told apart."""
 SURVEY_CELLS_PER_PATCH = 0.5
-"""Cells to the side of a patch, which must be smaller than a cell. The smaller the cells, the fewer triangles are kept
-about a doubtful patch."""
+"""Cells along the side of a patch, which must be smaller than a cell. The smaller the cells, the fewer triangles are
+kept about a doubtful patch."""
 
 PATCH_TEXELS: dict[Quality, float] = {"fast": 3.2, "balanced": 1.4}
 """Texels along a side of a patch, at most. At 1.4 a torus knot of 500,000 triangles has 0.08% wrong hits at a
 resolution of 256, 0.02% misses and a sixteenth of a texel of 128 at the 99th percentile; at 1.6 a quarter more, and a
 quarter fewer patches."""
 FACING_MOST: dict[Quality, float] = {"fast": 0.75, "balanced": 0.9}
-"""|n . axis| over the largest of the three from which a map keeps a patch. Where another map faces a surface much
-better, its patches are good and these are long and slanted: of balanced ones there are 15% more with none and 7% more
-rays are wrong. Large patches leave slits where two maps meet: with 0.9, of 200,000 rays, 157 slipped through fast ones
-that faced them, with 0.75 16. In trusted maps it is 0: on a rough surface, where normals go to and fro, it would leave
-holes."""
+"""|n . axis| over the largest of the three from which a map makes a patch. Where another map faces a surface much
+better, its patches are good, and this map's are long and slanted: without a limit there are 15% more balanced patches
+and 7% more rays are wrong. But large patches leave slits where two maps meet: of 200,000 rays 157 slipped through fast
+patches that faced them with 0.9, and 16 with 0.75. In trusted maps there is no limit: on a rough surface, where normals
+vary from triangle to triangle, it would leave holes."""
 LARGEST_TURN: dict[Quality, float] = {"fast": 0.8, "balanced": 0.4}
 """Radians between neighbouring patches from which they are doubtful, see ``patch_check.py``: a mean hides a bad few."""
 LARGEST_ERROR: dict[Quality, float] = {"fast": 0.008, "balanced": 0.00095}
-"""Share of rays that may be expected to be wrong."""
+"""Share of rays that may be expected to be wrong, at most."""
 ERROR_OF_TURN = 0.1
-"""The expected share, of the mean square of the turns."""
+"""The expected share of wrong rays, divided by the mean square of the turns."""
 OPEN = 1.5
-"""Times that share on a mesh that is open or wound both ways: a ray that meets the back of a patch at the horizon is
-not passed on there."""
+"""How many times that share is expected on a mesh that is open or wound both ways: there a ray that meets the back of a
+patch at the horizon is not passed on."""
 
 TRIANGLE_BYTES, PATCH_BYTES = 54.0, 47.0
-"""What a triangle and a patch take in the tree."""
+"""Bytes of a triangle and of a patch in the tree."""
 WORTH_SAVING = 2.0 / 3.0
 """Share of the bytes that patches must save."""
 DENSE: dict[Quality, float] = {"fast": 25.0, "balanced": 5.0}
-"""Small triangles per patch, two and a half per texel, from which patches stand for them: the maps are then the coarser
-picture. With four of a knot's triangles per patch twice as many rays slipped between patches."""
+"""Small triangles per patch from which patches stand for them: two and a half per texel. With four of a knot's
+triangles per patch twice as many rays slipped between patches."""
 FEW_TRIANGLES = 50_000
-"""Triangles up to which all are kept, however fine: they fit in the cache, and a thin object stays exact."""
+"""Triangles of a mesh up to which all are kept, however fine: they fit in the cache, and a thin object stays exact."""
 FEWEST_TRIANGLES = 2_000
-"""The same in maps that are trusted: fewer take no more room than patches."""
+"""The same in maps that are trusted: so few take no more room than patches."""
 
 SAMPLED_DENSE = 0.8
-"""Of ``DENSE``, from which the sample allows a survey: it gave 0.85 to 0.95 of what the survey counts."""
+"""Part of ``DENSE`` from which the sample allows a survey: a sample's density was 0.85 to 0.95 of the survey's."""
 SAMPLED_ERROR = 6.0
-"""Times the largest error up to which the sample allows a survey. The sample's was 0.5 to 1.7 times the survey's on
-smooth meshes, ten times that on rough ones; and what is three times too far off can still become right with patches of
-half the side."""
+"""Times the largest error up to which the sample allows a survey. The sample's error was 0.5 to 1.7 times the survey's
+on smooth meshes, and ten times that on rough ones. What is three times too far off can still become right with patches
+of half the side."""
 TRIES = 3
-"""Surveys with smaller and smaller patches; most often the second is the last."""
+"""Surveys with smaller and smaller patches, at most; most often the second is the last."""
 SMALLER = 0.95
-"""Of the side that should be right, what is tried: the error does not quite go with its square."""
+"""Part of the side that should be right which is tried next: the error does not quite go with its square."""
 FEWER_KEPT = 0.7
-"""Of the side of patches that are right, what is tried if they leave too many triangles."""
+"""Part of the side of patches that are right which is tried next if they leave too many triangles."""
 MOST_KEPT = 0.5
 """Share of triangles kept up to which smaller patches are tried."""
 MOST_DOUBTFUL = 0.12

@@ -188,7 +188,7 @@ def coordinates_under_patch(view: TreeView, triangle: int, query: Query, t: floa
 def closest_hits_exact(
     views: wp.array(dtype=TreeView), index: int, queries: wp.array(dtype=Query), count: int, hits: wp.array(dtype=Hit)
 ):
-    """The tracer's ``closest_hits``."""
+    """The tracer's ``closest_hits``. For patches smaller than their triangle, barycentrics are computed afterwards."""
     search_tree(views, index, queries, count, hits)
     if views[index].half_patch > 0.0:
         for i in range(count):
@@ -203,7 +203,7 @@ def closest_hits_exact(
 def any_hits_in_bulk(
     views: wp.array(dtype=TreeView), index: int, queries: wp.array(dtype=Query), count: int, hits: wp.array(dtype=Hit)
 ):
-    """Whether rays meet the bulk. The first hit on a patch may be in doubt, and not count."""
+    """Whether rays meet the bulk. Where the first hit on a patch may be doubtful, nearest hits are searched for."""
     if views[index].half_patch > 0.0 and views[index].front != 0.0:
         search_tree(views, index, queries, count, hits)
     else:
@@ -221,7 +221,7 @@ def any_hits_exact(
 
 @wp.func
 def is_own_surface(hit: Hit, direction: wp.vec3, outwards: wp.vec3) -> bool:
-    """Whether a ray that has just left a surface passes through what it meets to the same side as it left."""
+    """Whether a ray that leaves a surface passes through what it meets to the side that it leaves by, ``outwards``."""
     return wp.dot(hit.normal, direction) * wp.dot(hit.normal, outwards) > 0.0
 
 
@@ -229,8 +229,8 @@ def is_own_surface(hit: Hit, direction: wp.vec3, outwards: wp.vec3) -> bool:
 def occluded_exact(views: wp.array(dtype=TreeView), index: int, query: Query, outwards: wp.vec3) -> bool:
     """The tracer's ``occluded``.
 
-    A ray may start under the patches that stand for its own surface. It then passes through them from within, close to
-    its start: those are not met.
+    A ray may start beneath the patches that stand for its own surface. It then passes through them from within, close
+    to its start: such hits do not count.
     """
     if is_outlier_met(views[index].outliers, query):
         return True

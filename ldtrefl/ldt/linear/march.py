@@ -119,7 +119,7 @@ maps.column_shift = view.column_shift;
 maps.levels = view.levels;
 int steps = 0;
 const LinearSearch::Crossing found =
-    LinearSearch::search(maps, ray, t_exit, t_max, any, view.linear_steps, view.binary_steps, steps);
+    LinearSearch::search(maps, ray, t_exit, t_max, any_hit, view.linear_steps, view.binary_steps, steps);
 union Bits { int number; float bits; };
 const Bits fragment = {found.fragment}, looks = {steps};
 return {found.t, fragment.bits, looks.bits};
@@ -136,7 +136,7 @@ def search_maps(
     t_enter: float,
     t_exit: float,
     t_max: float,
-    any: bool,
+    any_hit: bool,
 ) -> wp.vec3:
     """:func:`march_linear` in the box, in C++: the bits of a ``Crossing``, in the order of its fields."""
     ...
@@ -144,19 +144,19 @@ def search_maps(
 
 @wp.func
 def march_linear(
-    views: wp.array(dtype=MapsView), index: int, origin: wp.vec3, direction: wp.vec3, t_max: float, any: bool
+    views: wp.array(dtype=MapsView), index: int, origin: wp.vec3, direction: wp.vec3, t_max: float, any_hit: bool
 ) -> Crossing:
-    """The paper's search, in texel space: the nearest crossing that a map confirms, before ``t_max``; any that lies
-    before it, if ``any`` will do.
+    """The paper's search, in texel space: the nearest crossing before ``t_max`` that a map confirms.
 
-    Its steps share out the ray's way through the box whatever ``t_max``, so what is met does not depend on it.
+    With ``any_hit`` it may be any crossing before ``t_max``. The samples share out the ray's way through the box
+    whatever ``t_max`` is, so what is met does not depend on it.
     """
     crossing = Crossing()
     crossing.t = float(wp.inf)
     crossing.fragment = -1
     span = widened_span(views[index].size, origin, direction)
     if span[0] <= span[1] and span[0] < t_max:
-        found = search_maps(views, index, origin, direction, span[0], span[1], t_max, any)
+        found = search_maps(views, index, origin, direction, span[0], span[1], t_max, any_hit)
         crossing.steps = wp.cast(found[2], wp.int32)
         if found[0] < t_max:
             crossing.t = found[0]
@@ -166,7 +166,7 @@ def march_linear(
 
 @wp.func
 def distance_to_near(query: Query) -> float:
-    """How far a ray goes before it is near the object, where float32 does."""
+    """How far a ray goes before it is near the object: from there on float32 is precise enough."""
     if wp.max(wp.abs(query.origin)) > NEAR:
         return distance_passed(query.origin, query.direction, NEAR)
     return 0.0
