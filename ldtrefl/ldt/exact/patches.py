@@ -37,10 +37,10 @@ class PatchTarget:
 
 
 @wp.struct
-class Corners:
-    """A triangle by its corners."""
+class SnappedTriangle:
+    """A triangle of the mesh by its corners."""
 
-    a: wp.vec4i  # fixed-point texels, and the hash
+    a: wp.vec4i  # fixed-point texels, and the hash of their place
     b: wp.vec4i
     c: wp.vec4i
     triangle: int
@@ -55,7 +55,7 @@ class PatchList:
 
 
 @wp.func
-def fixed_normal(tri: Corners) -> wp.vec3:
+def fixed_normal(tri: SnappedTriangle) -> wp.vec3:
     """Unit normal of a triangle; 0 for one without area."""
     a, b, c = tri.a, tri.b, tri.c
     u = wp.vec3(float(b[0] - a[0]), float(b[1] - a[1]), float(b[2] - a[2]))
@@ -71,7 +71,7 @@ def faces_map(normal: wp.vec3, axis: int, facing_most: float) -> bool:
 
 
 @wp.func
-def facing_triangle(target: PatchTarget, axis: int, tri: Corners, normal: wp.vec3) -> FixedTriangle:
+def facing_triangle(target: PatchTarget, axis: int, tri: SnappedTriangle, normal: wp.vec3) -> FixedTriangle:
     """A triangle in the map of ``axis``; area 0 if the map does not face it."""
     if not faces_map(normal, axis, target.facing_most):
         return FixedTriangle()
@@ -81,7 +81,7 @@ def facing_triangle(target: PatchTarget, axis: int, tri: Corners, normal: wp.vec
 
 
 @wp.func
-def is_larger_than_texel(tri: Corners) -> bool:
+def is_larger_than_texel(tri: SnappedTriangle) -> bool:
     """Whether the box about a triangle is wider than a texel along any axis."""
     is_larger = bool(False)
     for i in range(3):
@@ -92,7 +92,9 @@ def is_larger_than_texel(tri: Corners) -> bool:
 
 
 @wp.func
-def patch_of(target: PatchTarget, tri: Corners, axis: int, u: int, v: int, depth: float, normal: wp.vec3) -> Patch:
+def patch_of(
+    target: PatchTarget, tri: SnappedTriangle, axis: int, u: int, v: int, depth: float, normal: wp.vec3
+) -> Patch:
     """The plane of a triangle over a texel of the map of ``axis``, a little wider than the texel."""
     slope_u, slope_v = -normal[(axis + 1) % 3] / normal[axis], -normal[(axis + 2) % 3] / normal[axis]
     half = 0.5 + PATCH_MARGIN
@@ -110,7 +112,7 @@ def patch_of(target: PatchTarget, tri: Corners, axis: int, u: int, v: int, depth
 
 
 @wp.func
-def lift_texels(target: PatchTarget, tri: Corners, place: int, out: PatchList) -> int:
+def lift_texels(target: PatchTarget, tri: SnappedTriangle, place: int, out: PatchList) -> int:
     """Make patches of the texels whose centres a triangle covers in the maps that face it, from ``place`` on.
 
     Returns how many there are. If ``place`` is COUNT_ONLY, none is made.

@@ -19,7 +19,7 @@ from ldtrefl.device.launch import kernel
 from ldtrefl.geometry.box import cell_holding, cell_number
 from ldtrefl.geometry.fixed_raster import TEXEL_OF_SUBTEXEL, first_centre, last_centre
 from ldtrefl.ldt.exact.patch import Patch
-from ldtrefl.ldt.exact.patches import COUNT_ONLY, Corners, PatchList, PatchTarget, lift_texels
+from ldtrefl.ldt.exact.patches import COUNT_ONLY, PatchList, PatchTarget, SnappedTriangle, lift_texels
 from ldtrefl.ldt.fragments import snapped_vertices
 from ldtrefl.ldt.texel_frame import TexelFrame
 from ldtrefl.world.device_mesh import DeviceMesh
@@ -41,15 +41,15 @@ class SurveyResults:
     open_edges: wp.array(dtype=wp.uint64)  # the sum of ``edge_sum``
     volume: wp.array(dtype=wp.float64)  # the sum of ``volume_below``
     # Per triangle:
-    corners: wp.array(dtype=Corners)  # of those that give patches; a chunk's stand where its triangles do
+    patched_triangles: wp.array(dtype=SnappedTriangle)  # a chunk's stand from its first triangle's place on
     cell: wp.array(dtype=wp.int32)  # of its middle, or NO_CELL
 
 
 @wp.func
-def corners_of(target: PatchTarget, triangle: int) -> Corners:
+def snapped_triangle(target: PatchTarget, triangle: int) -> SnappedTriangle:
     """A triangle of the mesh."""
     vertices = target.faces[triangle]
-    made = Corners()
+    made = SnappedTriangle()
     made.a = target.fixed[vertices[0]]
     made.b = target.fixed[vertices[1]]
     made.c = target.fixed[vertices[2]]
@@ -58,7 +58,7 @@ def corners_of(target: PatchTarget, triangle: int) -> Corners:
 
 
 @wp.func
-def edge_sum(tri: Corners) -> wp.uint64:
+def edge_sum(tri: SnappedTriangle) -> wp.uint64:
     """A triangle's share of a sum over directed edges that changes its sign with an edge's direction.
 
     The sum over a mesh is 0 where every edge has its opposite. An edge's term is h = a b (b - a), of the hashes of its
@@ -69,7 +69,7 @@ def edge_sum(tri: Corners) -> wp.uint64:
 
 
 @wp.func
-def volume_below(tri: Corners) -> wp.float64:
+def volume_below(tri: SnappedTriangle) -> wp.float64:
     """Six times the signed volume between a triangle and the plane z = 0, cubic fixed-point texels.
 
     The sum over a closed mesh is six times the volume that it encloses, below 0 if its normals look in.
@@ -80,7 +80,7 @@ def volume_below(tri: Corners) -> wp.float64:
 
 
 @wp.func
-def lowest_corner(tri: Corners) -> wp.vec3i:
+def lowest_corner(tri: SnappedTriangle) -> wp.vec3i:
     """The low corner of the box about a triangle, fixed-point texels."""
     a, b, c = tri.a, tri.b, tri.c
     return wp.vec3i(
@@ -89,7 +89,7 @@ def lowest_corner(tri: Corners) -> wp.vec3i:
 
 
 @wp.func
-def highest_corner(tri: Corners) -> wp.vec3i:
+def highest_corner(tri: SnappedTriangle) -> wp.vec3i:
     """The high corner of the box about a triangle, fixed-point texels."""
     a, b, c = tri.a, tri.b, tri.c
     return wp.vec3i(
@@ -98,7 +98,7 @@ def highest_corner(tri: Corners) -> wp.vec3i:
 
 
 @wp.func
-def cell_of_middle(target: PatchTarget, tri: Corners) -> int:
+def cell_of_middle(target: PatchTarget, tri: SnappedTriangle) -> int:
     """The cell of the survey that holds a triangle's middle."""
     third = target.cells_per_texel * TEXEL_OF_SUBTEXEL / 3.0
     a, b, c = tri.a, tri.b, tri.c
@@ -125,7 +125,7 @@ def survey_triangles(
     first: int,
     # In:
     target: PatchTarget,
-    nothing: PatchList,
+    nothing: PatchList,  # patches are only counted
     # Out:
     out: SurveyResults,
 ):
@@ -138,7 +138,7 @@ def survey_triangles(
     open_edges = wp.uint64(0)
     volume = wp.float64(0.0)
     for triangle in range(begin, wp.min(begin + CHUNK, target.faces.shape[0])):
-        tri = corners_of(target, triangle)
+        tri = snapped_triangle(target, triangle)
         open_edges += edge_sum(tri)
         volume += volume_below(tri)
         low, high = lowest_corner(tri), highest_corner(tri)
@@ -151,7 +151,7 @@ def survey_triangles(
             if may_cover_centres(low, high):
                 given = lift_texels(target, tri, COUNT_ONLY, nothing)
                 if given > 0:
-                    out.corners[begin + patched] = tri
+                    out.patched_triangles[begin + patched] = tri
                     patched += 1
                     patches += given
     out.small[chunk] = small
@@ -168,7 +168,7 @@ def make_patches(
     target: PatchTarget,
     places: wp.array(dtype=wp.int32),
     patched: wp.array(dtype=wp.int32),
-    corners: wp.array(dtype=Corners),
+    patched_triangles: wp.array(dtype=SnappedTriangle),
     # Out:
     out: PatchList,
 ):
@@ -176,7 +176,7 @@ def make_patches(
     chunk = first + wp.tid()
     place = int(places[chunk])
     for k in range(patched[chunk]):
-        place += lift_texels(target, corners[CHUNK * chunk + k], place, out)
+        place += lift_texels(target, patched_triangles[CHUNK * chunk + k], place, out)
 
 
 @kernel
@@ -240,7 +240,7 @@ class Survey:
             setattr(found, name, wp.zeros(chunks + 1, dtype=wp.int32, device=device))
         found.open_edges = wp.empty(chunks, dtype=wp.uint64, device=device)
         found.volume = wp.empty(chunks, dtype=wp.float64, device=device)
-        found.corners = wp.empty(self.triangles, dtype=Corners, device=device)
+        found.patched_triangles = wp.empty(self.triangles, dtype=SnappedTriangle, device=device)
         found.cell = wp.empty(self.triangles, dtype=wp.int32, device=device)
         return found
 
@@ -257,7 +257,7 @@ class Survey:
         made = PatchList()
         made.patches = wp.empty(self.count, dtype=Patch, device=self._device)
         made.texel = wp.empty(self.count, dtype=wp.int32, device=self._device)
-        inputs: list[Any] = [self._target, self._places, self._found.patched, self._found.corners, made]
+        inputs: list[Any] = [self._target, self._places, self._found.patched, self._found.patched_triangles, made]
         launch_chunks(make_patches, self.triangles, inputs, self._device)
         return made.patches, made.texel
 

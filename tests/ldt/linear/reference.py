@@ -1,4 +1,4 @@
-"""The paper's search as ``ldtrefl/march_linear.py`` defines it, sample after sample, in NumPy's float32.
+"""The paper's search as ``ldt/linear/march.py`` defines it, sample after sample, in NumPy's float32.
 
 Slow, and plain: nothing is skipped, fragments are counted one by one. What the package answers has the same bits.
 """
