@@ -193,7 +193,7 @@ TESTS = files("tests/**/test_*.py")
 
 
 def untested(path: str) -> list[str]:
-    """The module, if no test is named after it. Parts of tools are tested with the tool, and ``__main__`` with ``cli``."""
+    """The module, if no test is named after it. Parts of tools are tested with the tool, ``__main__`` with ``cli``."""
     needs = not path.endswith(("__init__.py", "__main__.py")) and (path.startswith("ldtrefl/") or path.count("/") == 1)
     return ["no test of its name"] if needs and path not in {module_under_test(test) for test in TESTS} else []
 

@@ -36,7 +36,7 @@ struct TreeRays : Vectors {
         float half_patch;         // half the side of a patch
     };
 
-    // A ray as it is asked for (trace.py): hits at 0 <= t < t_max count.
+    // A ray as it is asked for (tracer.py): hits at 0 <= t < t_max count.
     struct Query {
         double origin[3];
         float direction[3], t_max;
