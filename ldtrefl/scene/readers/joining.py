@@ -35,12 +35,12 @@ def joined_mesh(pieces: list[Piece]) -> Mesh:
     if len(pieces) > 1:
         faces = faces + np.repeat(first_vertex[:-1], np.diff(first_triangle))[:, None]
     uvs = _joined_uvs(pieces)
-    examples, numbers = one_of_each_material(pieces)
-    colors_and_textures = [base_color_of(example) for example in examples]
+    materials, numbers = distinct_materials(pieces)
+    colors_and_textures = [base_color_of(material) for material in materials]
     parts = []
     for first, piece, number in zip(first_triangle[:-1], pieces, numbers, strict=True):
         color, texture = colors_and_textures[number]
-        parts.append(Part(first, color, texture if uvs_of(piece) is not None else None))
+        parts.append(Part(first, color, texture if piece.uvs is not None else None))
     mesh = Mesh(vertices, faces, None, uvs, tuple(parts))
     return _with_normals(mesh, pieces, first_vertex, first_triangle)
 
@@ -71,37 +71,25 @@ def _with_normals(mesh: Mesh, pieces: list[Piece], first_vertex: np.ndarray, fir
 
 def _joined_uvs(pieces: list[Piece]) -> np.ndarray | None:
     """(n, 2) float32 of all pieces, 0 for those without; None if none has any."""
-    found = [uvs_of(piece) for piece in pieces]
+    found = [piece.uvs for piece in pieces]
     if all(uv is None for uv in found):
         return None
     none = [np.zeros((len(piece.vertices), 2), np.float32) for piece in pieces]
     return np.concatenate([zeros if uv is None else uv for uv, zeros in zip(found, none, strict=True)])
 
 
-def material_of(piece: Piece) -> object | None:
-    """trimesh's material of a piece; None without one."""
-    return getattr(piece.visual, "material", None)
-
-
-def one_of_each_material(pieces: list[Piece]) -> tuple[list[Piece], list[int]]:
-    """(a piece of each material, for each piece the number of its material): a material of many pieces is read once."""
+def distinct_materials(pieces: list[Piece]) -> tuple[list[object | None], list[int]]:
+    """(trimesh's materials, each once; for each piece the number of its material)."""
     # By identity: trimesh compares materials by hashes of their unpacked pictures.
-    examples = {id(material_of(piece)): piece for piece in pieces}
-    numbers = {identity: number for number, identity in enumerate(examples)}
-    return list(examples.values()), [numbers[id(material_of(piece))] for piece in pieces]
+    numbers: dict[int, int] = {}
+    for piece in pieces:
+        numbers.setdefault(id(piece.material), len(numbers))
+    materials = {id(piece.material): piece.material for piece in pieces}
+    return list(materials.values()), [numbers[id(piece.material)] for piece in pieces]
 
 
-def uvs_of(piece: Piece) -> np.ndarray | None:
-    """(n, 2) float32 texture coordinates of a piece's vertices; None if it has none that can be used."""
-    uv = getattr(piece.visual, "uv", None)
-    if uv is None or np.shape(uv) != (len(piece.vertices), 2) or not np.isfinite(uv).all():
-        return None
-    return np.asarray(uv, np.float32)
-
-
-def base_color_of(piece: Piece) -> tuple[tuple[float, float, float], StoredPicture | None]:
-    """A piece's base colour, linear, and its texture as it is stored. As in glTF factors are linear, textures sRGB."""
-    material = material_of(piece)
+def base_color_of(material: object | None) -> tuple[tuple[float, float, float], StoredPicture | None]:
+    """A material's base colour, linear, and its texture. As in glTF factors are linear and textures sRGB."""
     if material is None:
         return (1.0, 1.0, 1.0), None
     factor = getattr(material, "baseColorFactor", None)

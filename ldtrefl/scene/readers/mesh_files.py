@@ -22,7 +22,7 @@ from ldtrefl.files.mesh_textures import take_memory_for_textures
 from ldtrefl.files.pillow_limit import no_pixel_limit
 from ldtrefl.scene.mesh import Mesh
 from ldtrefl.scene.readers.archives import ARCHIVES, archive_kind, mesh_files
-from ldtrefl.scene.readers.joining import joined_mesh, joining_bytes, material_of, one_of_each_material
+from ldtrefl.scene.readers.joining import distinct_materials, joined_mesh, joining_bytes
 from ldtrefl.scene.readers.memory import reading_bytes
 from ldtrefl.scene.readers.pieces import Piece, pieces_of
 from ldtrefl.scene.readers.trimesh_warnings import trimesh_warnings
@@ -71,7 +71,7 @@ def _load_mesh(path: str, _modified: int, _size: int) -> Mesh:
     with budget.account(), np.errstate(all="ignore"):
         try:
             pieces, taken = _read_pieces(path)
-            take_memory_for_textures([material_of(piece) for piece in one_of_each_material(pieces)[0]])
+            take_memory_for_textures(distinct_materials(pieces)[0])
             # What was taken to read the file is free again.
             budget.take(max(0.0, joining_bytes(pieces) - taken), "its mesh")
             return joined_mesh(pieces)

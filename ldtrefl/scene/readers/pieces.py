@@ -36,8 +36,10 @@ class Piece:
     """(m, 3) int64."""
     normals: np.ndarray | None
     """(n, 3) float64, as stored."""
-    visual: Any
-    """trimesh's: ``uv`` and ``material``."""
+    uvs: np.ndarray | None
+    """(n, 2) float32 texture coordinates, None without any that can be used."""
+    material: object | None
+    """trimesh's material."""
 
 
 def pieces_of(data: bytes, kind: str, beside: Resolver) -> list[Piece]:
@@ -91,7 +93,10 @@ def _piece(entry: dict[str, Any]) -> Piece | None:
     if vertices.ndim == 2 and faces.ndim == 2 and faces.dtype.kind in "iu":
         if int(faces.min()) < 0 or int(faces.max()) >= len(vertices):
             Mesh(vertices, faces)  # says which triangle
-    return Piece(vertices, faces, _stored_normals(entry.get("vertex_normals"), vertices), entry.get("visual"))
+    visual = entry.get("visual")
+    normals = _stored_normals(entry.get("vertex_normals"), vertices)
+    uvs = _stored_uvs(getattr(visual, "uv", None), len(vertices))
+    return Piece(vertices, faces, normals, uvs, getattr(visual, "material", None))
 
 
 def _stored_normals(stored: ArrayLike | None, vertices: np.ndarray) -> np.ndarray | None:
@@ -109,6 +114,13 @@ def _stored_normals(stored: ArrayLike | None, vertices: np.ndarray) -> np.ndarra
     is_far_from_unit = (np.abs(lengths - 1.0) > NEAR_UNIT) & (lengths > 0.0)
     normals[is_far_from_unit] /= lengths[is_far_from_unit, None]
     return normals
+
+
+def _stored_uvs(stored: ArrayLike | None, vertices: int) -> np.ndarray | None:
+    """(vertices, 2) float32 texture coordinates as a file holds them; None if it has none that can be used."""
+    if stored is None or np.shape(stored) != (vertices, 2) or not np.isfinite(stored).all():
+        return None
+    return np.asarray(stored, np.float32)
 
 
 def _node(node: Any) -> dict[str, Any]:
@@ -164,7 +176,8 @@ def _moved(piece: Piece, matrix: np.ndarray) -> Piece:
     normals = piece.normals
     if normals is not None:
         normals = _stored_normals(np.einsum("ni,ki->nk", normals, -cofactors if mirrors else cofactors), vertices)
-    return Piece(vertices, piece.faces[:, ::-1] if mirrors else piece.faces, normals, piece.visual)
+    faces = piece.faces[:, ::-1] if mirrors else piece.faces
+    return Piece(vertices, faces, normals, piece.uvs, piece.material)
 
 
 def _split_by_texture(read: dict[str, Any]) -> dict[str, Any]:

@@ -68,7 +68,7 @@ class Shape:
     name: str
     make: Callable[..., Mesh]
     """Checked parameters -> the mesh."""
-    checked: Callable[..., dict[str, Any]]
+    checked: Callable[..., dict[str, object]]
     """Parameters -> all of them, checked, with the defaults of those not given. Raises pydantic's ValidationError."""
     needed_bytes: Callable[..., float]
     """Checked parameters -> the bytes that making and rendering the shape takes, an estimate."""
