@@ -43,14 +43,15 @@ from ldtrefl.scene.placement import placement
 from ldtrefl.scene.readers.mesh_files import load_mesh
 
 MAX_SIDE = 16384
-"""Pixels along a side of an image, and objects in a scene."""
+"""The most pixels along a side of an image, and the most objects in a scene."""
 MAX_LIGHTS = 64
+"""The most lights in a scene."""
 PARALLEL = 1e-9
 """Sine of the angle between the line of sight and ``up``: below it float64's rounding decides where right is."""
 NARROWEST = 1e-6
-"""Least degrees that a camera sees: at 16,384 pixels a pixel's share is still far above float64's rounding."""
+"""The smallest field of view in degrees: at 16,384 pixels a pixel's share is still far above float64's rounding."""
 ROUNDING = 1e-6
-"""By which albedo and mirror may add up to more than 1: 0.9 + 0.1 are written in decimals."""
+"""How far above 1 albedo and mirror may add up without a warning: decimals such as 0.9 and 0.1 are rounded."""
 
 CORNERS = np.array(np.meshgrid([0, 1], [0, 1], [0, 1])).reshape(3, -1).T
 """(8, 3): of a box's corners, along each axis 0 for its low and 1 for its high side."""
@@ -85,11 +86,14 @@ class Camera:
 @refusing_in_one_line
 @dataclass(frozen=True, kw_only=True, config=CONFIG)
 class Environment:
-    """What a ray that hits nothing sees: a blend by height, or an equirectangular image."""
+    """What a ray that hits nothing sees: a blend from ground to sky by its height, or an equirectangular image."""
 
     sky: Color = (0.55, 0.70, 0.95)
+    """Radiance straight up."""
     ground: Color = (0.30, 0.28, 0.25)
+    """Radiance straight down."""
     image: Text | None = None
+    """A picture file, in place of sky and ground."""
 
     @functools.cached_property
     def picture(self) -> StoredPicture | None:
@@ -122,7 +126,7 @@ class Light:
     """Point: ``intensity / distance^2`` in place of ``radiance``."""
 
     @model_validator(mode="after")
-    def _whole(self) -> Light:
+    def _has_what_its_kind_needs(self) -> Light:
         own = {"directional": ("direction", "radiance"), "point": ("position", "intensity")}
         for kind, keys in own.items():
             for key in keys:
@@ -206,7 +210,7 @@ class Object:
         return self
 
     @model_validator(mode="after")
-    def _says_if_it_shines(self) -> Object:
+    def _warns_if_it_adds_light(self) -> Object:
         if self.material.excess is not None:
             total, channel = self.material.excess
             called = self.name or self.shape or (self.mesh if isinstance(self.mesh, str) else "without a name")
@@ -239,7 +243,7 @@ class Object:
         return any(self.material.mirror)
 
     def world_from_object(self) -> np.ndarray:
-        """(4, 4) float64.
+        """The object's place: (4, 4) float64, from the mesh's own coordinates to the world.
 
         Raises:
             InputError: fit, scale and the mesh's own size give a size that is not allowed.
@@ -247,7 +251,7 @@ class Object:
         return self._world_from_object.copy()
 
     def world_corners(self) -> np.ndarray:
-        """(8, 3) float64: the corners of the object's own box, in the world."""
+        """(8, 3) float64: the corners of the mesh's bounding box, placed in the world."""
         low, high = self.geometry.bounds
         corners = np.where(CORNERS == 0, low, high)
         return (np.hstack([corners, np.ones((8, 1))]) @ self._world_from_object.T)[:, :3]
@@ -259,7 +263,7 @@ class Object:
 
 @functools.lru_cache(maxsize=1024)
 def _warn_once(line: str) -> None:
-    """Say it once: an object is built anew whenever it is moved."""
+    """Log a warning once, although an object is built anew, and so checked, whenever it is moved."""
     _log.warning("%s", line)
 
 

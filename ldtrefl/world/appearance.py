@@ -59,7 +59,7 @@ def appearance_of(mesh: Mesh, texture: StoredPicture | None, device: wp.Device) 
 
 
 def _joined(pools: list[np.ndarray], dtype: type, device: wp.Device) -> wp.array:
-    """(n, 3) arrays, one after the other, on a device. On the CPU a single one is read where it lies: it may be large.
+    """(n, 3) arrays, one after the other, on a device. On the CPU a single one is not copied: it may be large.
 
     Raises:
         InputError: they are more than can be numbered.

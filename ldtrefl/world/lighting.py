@@ -15,12 +15,14 @@ BRIGHTEST = 1e30
 def lighting_of(
     scene: Scene, device_from_world: np.ndarray, decoded: wp.array, device: wp.Device, before: LightingRecord | None
 ) -> LightingRecord:
-    """The lights and the environment of a scene; ``up`` is the camera's, and set before every frame.
+    """The lights and the environment of a scene. ``up`` is left at zero: it is the camera's and set before every frame.
 
     Args:
+        scene: what has them.
         device_from_world: (4, 4) float64.
         decoded: (256,) float32, the linear value of every byte.
-        before: one whose environment picture is the scene's, and is used again.
+        device: where they are read.
+        before: another record with the same environment picture, which is then used again; or None.
     """
     record = LightingRecord()
     lights = [_light(light, device_from_world) for light in scene.lights]
@@ -44,6 +46,7 @@ def lighting_of(
 
 
 def _light(light: Light, device_from_world: np.ndarray) -> LightRecord:
+    """A light in device space."""
     record = LightRecord()
     record.is_point = int(light.kind == "point")
     if light.position is not None and light.intensity is not None:
