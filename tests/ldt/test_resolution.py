@@ -29,7 +29,7 @@ def scene(distance: float) -> Scene:
 
 def chosen(renderer: Renderer) -> int:
     """The resolution of the one object that is peeled, as the last frame used it."""
-    *_, maps = vars(renderer._method)["_maps"].values()
+    *_, maps = renderer._method.tracer._maps.values()  # those used last stand last
     return int(maps.resolution)
 
 
