@@ -25,14 +25,14 @@ def main() -> int:
     """Run the command line; the exit status."""
     _open_missing_streams()
     _handle("SIGINT", _leave_at_once)
-    from ldtrefl.cli import commands  # noqa: PLC0415  a second and a half, in which Ctrl-C must not end in a traceback
+    from ldtrefl.cli import program  # noqa: PLC0415  a second and a half, in which Ctrl-C must not end in a traceback
 
     _watch_over_compiler()
     _handle("SIGTERM", _leave_cleanly)
     _handle("SIGHUP", _leave_cleanly)
     try:
         _handle("SIGINT", signal.default_int_handler)
-        return commands.main()
+        return program.main()
     except KeyboardInterrupt:  # before the command begins, or after its end
         return INTERRUPTED
     finally:

@@ -1,4 +1,5 @@
-"""The command line.
+"""The command line: one file a command in ``commands/``, and what they share.
 
-Imports everything else. Start with ``commands.py``.
+Imports every other room. Start with ``program.py``, which runs a command and turns what it raises into an exit status;
+a new command is a file in ``commands/``.
 """

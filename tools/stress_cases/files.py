@@ -27,7 +27,7 @@ import numpy as np
 import OpenImageIO as oiio
 
 import ldtrefl
-from ldtrefl.cli import commands
+from ldtrefl.cli import program
 
 from . import mutations
 from .good_files import LOOP, MESHES, PICTURES, write_good_meshes, write_good_pictures
@@ -269,7 +269,7 @@ def scene_text(thing: str, sky: str = "8.png", texture: str = "8.png") -> str:
 def render(scene: Path, output: Path, *options: str) -> int:
     """The command line in this process, with its report thrown away."""
     with contextlib.redirect_stdout(io.StringIO()):
-        return commands.main(["render", str(scene), "-o", str(output), "--threads", "1", *options])
+        return program.main(["render", str(scene), "-o", str(output), "--threads", "1", *options])
 
 
 def read(path: Path) -> np.ndarray | None:

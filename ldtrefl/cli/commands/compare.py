@@ -1,0 +1,78 @@
+"""``ldtrefl compare``: a scene by several methods, and how far each is from the truth."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ldtrefl.base.errors import InputError, printable
+from ldtrefl.cli.options import Device, Memory, SceneFile, Threads, parsed_settings, use_resources
+from ldtrefl.cli.printing import say, stage_times
+from ldtrefl.cli.progress import progress_bar
+from ldtrefl.compare.report import TEXEL_RESOLUTION, Row, compared, error_table, timed_frame, write_json
+from ldtrefl.files.pictures import difference_image, save_image
+from ldtrefl.files.whole import writable_folder
+from ldtrefl.methods import find_method
+from ldtrefl.scene.description import load_scene
+
+PLACE_IN_HELP = 20
+
+app = typer.Typer()
+
+
+@app.command()
+def compare(
+    scene: SceneFile,
+    methods: Annotated[str, typer.Option(help="Method names, comma-separated.")] = "ldt,envmap",
+    reference: Annotated[str, typer.Option(help="The method that counts as the truth.")] = "bvh",
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Folder for images; SCENE's name + '-compare' if not given.")
+    ] = None,
+    settings: Annotated[
+        list[str] | None, typer.Option("--set", metavar="METHOD.OPTION=VALUE", help="An option of one method.")
+    ] = None,
+    device: Device = None,
+    threads: Threads = None,
+    memory: Memory = None,
+) -> None:
+    """Render a scene by several methods; print errors and write images and difference pictures."""
+    use_resources(memory, threads)
+    names = [name.strip() for name in methods.split(",") if name.strip()]
+    options = _options_by_method(settings, [reference, *names])
+    folder = writable_folder(output or Path(scene.stem + "-compare"), make=True)
+    loaded = load_scene(scene)
+    rows: dict[str, Row] = {}
+    with progress_bar():
+        _, truth = timed_frame(loaded, reference, device, options[reference])
+        save_image(folder / f"{reference}.png", truth.image)
+        for name in names:
+            renderer, frame = timed_frame(loaded, name, device, options[name])
+            resolution = options[name].get("resolution")
+            texels = resolution if isinstance(resolution, int) else TEXEL_RESOLUTION
+            rows[name] = compared(frame, truth, renderer, texels)
+            save_image(folder / f"{name}.png", frame.image)
+            save_image(folder / f"{name}-difference.png", difference_image(frame.image, truth.image))
+    write_json(folder / "compare.json", str(scene), reference, rows)
+    title = f"{scene} against {reference} ({truth.reflector_mask.sum()} reflector pixels)"
+    say(error_table(rows, printable(title)))
+    say(f"{reference}: {sum(truth.stats.seconds.values()):.3f} s", stage_times(truth))
+    say(f"images in {folder}")
+
+
+def _options_by_method(settings: list[str] | None, names: list[str]) -> dict[str, dict[str, object]]:
+    """``["ldt.resolution=256"]`` -> ``{"ldt": {"resolution": 256}, "bvh": {}}``, for each of the methods ``names``.
+
+    Raises:
+        InputError: a method that is not one of them, or an option that it does not have or allow.
+    """
+    options: dict[str, dict[str, object]] = {name: {} for name in names}
+    for key, value in parsed_settings(settings).items():
+        method, dot, option = key.partition(".")
+        if not dot or method not in names:
+            raise InputError(f"--set {key}: expected METHOD.OPTION=VALUE, METHOD one of {', '.join(names)}")
+        options[method][option] = value
+    for name in names:
+        find_method(name).configured(options[name])
+    return options

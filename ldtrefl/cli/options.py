@@ -1,0 +1,87 @@
+"""Arguments and options that several commands have, and what they mean."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ldtrefl.base import budget
+from ldtrefl.base.errors import InputError
+from ldtrefl.device.launch import set_threads
+from ldtrefl.scene import shapes
+from ldtrefl.scene.mesh import Mesh
+from ldtrefl.scene.readers.mesh_files import load_mesh
+from ldtrefl.scene.toml_text import check_regular, parse_toml
+
+SceneFile = Annotated[Path, typer.Argument(metavar="SCENE", help="A scene file (TOML).")]
+CacheFolder = Annotated[
+    Path | None, typer.Option("--cache", metavar="DIR", help="Keep maps here; the user's cache folder if not given.")
+]
+Memory = Annotated[
+    str | None,
+    typer.Option(
+        "--memory",
+        metavar="SIZE",
+        help="Memory that the scene may take, such as 8G or 512M; LDTREFL_MEMORY or else 4G if not given.",
+    ),
+]
+Device = Annotated[str | None, typer.Option(help="'cpu' (default) or a CUDA device such as 'cuda:0'.")]
+Threads = Annotated[int | None, typer.Option(help="CPU threads; all cores if not given.")]
+
+
+def use_resources(memory: str | None, threads: int | None) -> None:
+    """Obey ``--memory`` and ``--threads``.
+
+    Raises:
+        InputError: one of them is not allowed, or ``LDTREFL_MEMORY`` is not.
+    """
+    set_threads(threads)
+    allow_memory(memory)
+
+
+def allow_memory(size: str | None) -> None:
+    """Obey ``--memory``.
+
+    Raises:
+        InputError: it is not allowed, or ``LDTREFL_MEMORY`` is not.
+    """
+    budget.set_memory_limit(None if size is None else budget.size_of(size, "--memory"))
+    budget.memory_limit()  # so that a wrong value in the environment is found before any work is done
+
+
+def parsed_settings(settings: list[str] | None) -> dict[str, object]:
+    """Values of ``--set``: ``["resolution=256"]`` -> ``{"resolution": 256}``. What is no value of TOML is a word.
+
+    Raises:
+        InputError: a setting without ``=``, or a value beyond what a scene file may hold.
+    """
+    options: dict[str, object] = {}
+    for setting in settings or []:
+        name, equals, value = setting.partition("=")
+        if not equals or not name.strip():
+            raise InputError(f"--set {setting}: expected OPTION=VALUE")
+        try:
+            tables = parse_toml(f"value = {value}")
+        except InputError as error:
+            if not isinstance(error.__cause__, ValueError):  # not a word, but beyond the limits of any value
+                raise error.within(f"--set {name}") from None
+            tables = {}
+        options[name.strip()] = tables["value"] if tables.keys() == {"value"} else value.strip()
+    return options
+
+
+def mesh_or_shape(name: str) -> Mesh:
+    """The procedural shape called ``name``, or else the mesh file.
+
+    Raises:
+        InputError: there is neither, or the file cannot be read.
+    """
+    path = Path(name)
+    if name in shapes.names() and not path.exists():
+        return shapes.make(name)
+    with suppress(OSError):  # a missing file: load_mesh says so
+        check_regular(path, "a mesh file")
+    return load_mesh(name)

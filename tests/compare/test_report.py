@@ -1,0 +1,73 @@
+"""The table and ``compare.json`` hold every metric that there is."""
+
+import io
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+import ldtrefl
+from ldtrefl.compare.metrics import all_metrics
+from ldtrefl.compare.report import Row, compared, error_table, timed_frame, write_json
+from tests.conftest import SMALL_SCENE
+
+
+@pytest.fixture(scope="module")
+def rows(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Row]:
+    path = tmp_path_factory.mktemp("scene") / "scene.toml"
+    path.write_text(SMALL_SCENE)
+    scene = ldtrefl.load_scene(path)
+    _, truth = timed_frame(scene, "bvh")
+    made = {}
+    for method in ("ldt", "envmap"):
+        renderer, frame = timed_frame(scene, method)
+        made[method] = compared(frame, truth, renderer)
+    return made
+
+
+def test_every_metric_that_can_be_is_taken(rows: dict[str, Row]) -> None:
+    assert list(rows["ldt"].errors) == [metric.name for metric in all_metrics()]
+    assert list(rows["envmap"].errors) == ["ssim", "psnr", "flip", "relmse"]  # it has no hits
+    assert rows["ldt"].errors["ssim"] > 0.999 > rows["envmap"].errors["ssim"]
+    assert {"gbuffer", "peel", "march", "shade"} <= set(rows["ldt"].seconds)
+
+
+def test_the_resolution_is_the_unit_of_distances(tmp_path: Path) -> None:
+    (tmp_path / "scene.toml").write_text(SMALL_SCENE)
+    scene = ldtrefl.load_scene(tmp_path / "scene.toml")
+    renderer, frame = timed_frame(scene, "ldt", options={"search": "linear", "resolution": 64})
+    _, truth = timed_frame(scene, "bvh")
+    coarse, fine = (compared(frame, truth, renderer, resolution).errors["p99"] for resolution in (64, 256))
+    assert fine == pytest.approx(4 * coarse) and coarse > 0
+
+
+def test_the_table_has_a_column_for_each_heading(rows: dict[str, Row]) -> None:
+    table = error_table(rows, "a title")
+    headings = [metric.heading for metric in all_metrics() if metric.heading is not None]
+    assert [column.header for column in table.columns] == ["method", "seconds", "stages", *headings]
+    said = io.StringIO()
+    Console(width=200, file=said).print(table)
+    ldt, envmap = (
+        next(line for line in said.getvalue().splitlines() if f"│ {name} " in line) for name in ("ldt", "envmap")
+    )
+    assert f"{rows['ldt'].errors['ssim']:.4f}" in ldt and " - " not in ldt
+    assert envmap.count(" - ") == 6
+
+
+def test_json_has_no_infinity(tmp_path: Path) -> None:
+    row = Row({"march": 0.5}, {"psnr": float("inf"), "p99": float("nan"), "ssim": 0.5})
+    write_json(tmp_path / "compare.json", "scene.toml", "bvh", {"ldt": row})
+    assert json.loads((tmp_path / "compare.json").read_text()) == {
+        "scene": "scene.toml",
+        "reference": "bvh",
+        "ldt": {"seconds": {"march": 0.5}, "psnr": None, "p99": None, "ssim": 0.5},
+    }
+
+
+def test_a_frame_that_is_timed_compiles_nothing_and_keeps_nothing(tmp_path: Path) -> None:
+    (tmp_path / "scene.toml").write_text(SMALL_SCENE)
+    renderer, frame = timed_frame(ldtrefl.load_scene(tmp_path / "scene.toml"), "ldt")
+    assert "frames_kept" not in frame.stats.counters and frame.stats.counters["objects_peeled"] == 1
+    assert np.array_equal(renderer.render().image, frame.image)
