@@ -49,9 +49,8 @@ def test_the_table_has_a_column_for_each_heading(rows: dict[str, Row]) -> None:
     assert [column.header for column in table.columns] == ["method", "seconds", "stages", *headings]
     said = io.StringIO()
     Console(width=200, file=said).print(table)
-    ldt, envmap = (
-        next(line for line in said.getvalue().splitlines() if f"│ {name} " in line) for name in ("ldt", "envmap")
-    )
+    lines = said.getvalue().splitlines()
+    ldt, envmap = (next(line for line in lines if f"│ {name} " in line) for name in ("ldt", "envmap"))
     assert f"{rows['ldt'].errors['ssim']:.4f}" in ldt and " - " not in ldt
     assert envmap.count(" - ") == 6
 

@@ -1,0 +1,25 @@
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+from tests.cli.conftest import Done
+
+
+def test_it_writes_pictures_and_errors(run: Callable[..., Done], scene_folder: Path) -> None:
+    done = run("compare", "scene.toml", "-o", "made", "--set", "ldt.resolution=64")
+    assert done.status == 0 and not done.errors, done
+    assert all(
+        word in done.output for word in ("scene.toml against bvh", "envmap", "SSIM", "pixels p99", "images in made")
+    )
+    made = {path.name for path in (scene_folder / "made").iterdir()}
+    pictures = {f"{name}{kind}.png" for name in ("ldt", "envmap") for kind in ("", "-difference")} | {"bvh.png"}
+    assert made == pictures | {"compare.json"}
+    report = json.loads((scene_folder / "made" / "compare.json").read_text())
+    assert list(report) == ["scene", "reference", "ldt", "envmap"] and report["reference"] == "bvh"
+    assert report["ldt"]["ssim"] > 0.99 and "wrong_hits" not in report["envmap"]
+
+
+def test_any_method_may_be_the_truth(run: Callable[..., Done], scene_folder: Path) -> None:
+    done = run("compare", "scene.toml", "--reference", "ldt", "--methods", "ldt")
+    assert done.status == 0 and (scene_folder / "scene-compare" / "ldt-difference.png").is_file()
+    assert json.loads((scene_folder / "scene-compare" / "compare.json").read_text())["ldt"]["psnr"] is None

@@ -1,0 +1,27 @@
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import trimesh
+
+from tests.cli.conftest import Done
+
+
+def test_a_scene(run: Callable[..., Done]) -> None:
+    done = run("info", "scene.toml")
+    assert done.status == 0 and not done.errors
+    for words in ("camera: 24 x 16", "lights: none; shadows: False", "method: ldt", "torus", "4.0 GiB allowed"):
+        assert words in done.output, done.output
+
+
+def test_closed_and_open_meshes(run: Callable[..., Done], scene_folder: Path) -> None:
+    assert "closed: every texel has an even number" in run("info", "genus3").output
+    sheet = trimesh.Trimesh(np.array([[0, 0, 0], [1, 0, 0.1], [0, 1, 0.2]]), [[0, 1, 2]])
+    sheet.export(scene_folder / "sheet.ply")
+    done = run("info", "sheet.ply")
+    assert "1 triangles, 3 vertices" in done.output and "texels have an odd number" in done.output
+
+
+def test_memory_that_is_allowed(run: Callable[..., Done]) -> None:
+    assert "2.0 GiB allowed" in run("info", "scene.toml", "--memory", "2G").output
+    assert run("info", "scene.toml", "--memory", "1K").status == 2
