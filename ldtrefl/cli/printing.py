@@ -10,7 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ldtrefl.base.errors import printable
-from ldtrefl.renderer import Frame
+from ldtrefl.frame.result import Frame
 
 PIPE_WIDTH = 200
 """Columns for tables where standard output is no terminal, which would say how wide it is."""

@@ -13,7 +13,8 @@ from rich.table import Table
 from ldtrefl.compare.metrics import all_metrics
 from ldtrefl.compare.metrics.base import Comparison
 from ldtrefl.files.whole import written_whole
-from ldtrefl.renderer import Frame, Renderer
+from ldtrefl.frame.result import Frame
+from ldtrefl.renderer import Renderer
 from ldtrefl.scene.description import Scene
 
 TEXEL_RESOLUTION = 256

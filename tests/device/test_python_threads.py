@@ -6,7 +6,7 @@ import pytest
 import warp as wp
 
 import ldtrefl
-from ldtrefl.cli.commands import main
+from ldtrefl.cli.program import main
 from ldtrefl.device import launch
 from ldtrefl.device.python_threads import PythonThreads
 from tests.conftest import SMALL_SCENE
