@@ -23,6 +23,7 @@ class ReaderGone(Exception):
 class _Console(Console):
     def on_broken_pipe(self) -> None:
         """Rich calls this where the reader has gone; its own method ends the process with status 1."""
+        _console.cache_clear()  # this one holds what could not be written
         raise ReaderGone
 
 

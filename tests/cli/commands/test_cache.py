@@ -1,3 +1,5 @@
+"""``ldtrefl cache``: an empty folder."""
+
 from collections.abc import Callable
 from pathlib import Path
 

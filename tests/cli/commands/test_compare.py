@@ -1,3 +1,5 @@
+"""``ldtrefl compare``: pictures, table and JSON."""
+
 import json
 from collections.abc import Callable
 from pathlib import Path

@@ -1,3 +1,5 @@
+"""``ldtrefl info``: scenes and meshes."""
+
 from collections.abc import Callable
 from pathlib import Path
 

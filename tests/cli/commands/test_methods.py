@@ -1,3 +1,5 @@
+"""``ldtrefl methods``: every method."""
+
 from collections.abc import Callable
 
 from ldtrefl.methods import all_methods

@@ -1,3 +1,5 @@
+"""``ldtrefl peel``: counts and a picture."""
+
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,3 +1,5 @@
+"""``ldtrefl render``: pictures and statistics."""
+
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,3 +1,5 @@
+"""FLIP: order and ends."""
+
 import numpy as np
 
 from ldtrefl.compare.metrics import flip

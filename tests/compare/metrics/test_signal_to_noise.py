@@ -1,3 +1,5 @@
+"""PSNR, against known errors."""
+
 import numpy as np
 import pytest
 

@@ -1,3 +1,5 @@
+"""relMSE, against known errors."""
+
 import numpy as np
 import pytest
 

@@ -1,3 +1,5 @@
+"""SSIM, against its formula for flat images."""
+
 import numpy as np
 import pytest
 
