@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
+import datetime
 import functools
 import json
 import statistics
@@ -19,7 +20,7 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TypedDict
 
 import numpy as np
 from timing import in_turn
@@ -49,6 +50,48 @@ COUNTERS = {
 """What each skip makes less of."""
 OUTSIDE = ("gbuffer", "composite")
 """Stages that culling, maps and searches do not change."""
+
+
+class SkipRow(TypedDict):
+    """A scene with a skip and without it."""
+
+    skip: str
+    scene: str
+    milliseconds: dict[str, float]
+    """"with" and "without" the skip: medians."""
+    ratio: float
+    """Median over the rounds of the time with it over the time without."""
+    counter: dict[str, int]
+    """"with" and "without" the skip: what ``COUNTERS`` names."""
+    same: bool
+    """Whether both pictures have the same bits."""
+
+
+class CullingRow(TypedDict):
+    """What culling does in a scene. "safe" and "flat" are the values of the option ``cull``."""
+
+    scene: str
+    rays: int
+    entering: int
+    """Pairs of a ray and another object's bounding sphere that it enters."""
+    handed: int
+    """Pairs of a ray and an object that were searched."""
+    lost: dict[str, int]
+    """Pixels that differ from those of a frame without culling."""
+    hits: int
+    milliseconds: dict[str, float]
+    share_of_frame: float
+    """Of "safe", in a frame's time."""
+
+
+class Result(TypedDict):
+    """What is written to ``ablation.json``."""
+
+    date: str
+    threads: int
+    rounds: int
+    skips: list[SkipRow]
+    culling: list[CullingRow]
 
 
 def away_from(scene: Scene) -> Scene:
@@ -145,19 +188,19 @@ def same(a: Frame, b: Frame) -> bool:
     return np.array_equal(a.image, b.image) and np.array_equal(a.reflection, b.reflection)
 
 
-def ablate(scene: Scene, skip: str, rounds: int) -> dict[str, Any]:
-    """Time and counter of a scene with a skip and without it."""
+def ablate(name: str, scene: Scene, skip: str, rounds: int) -> SkipRow:
+    """Time and counter of the scene called ``name`` with a skip and without it."""
     if skip in ("maps", "attributes"):
         made = {"with": skips.names(), "without": all_but(skip)}
         frames: dict[str, Frame] = {}
 
-        def first_frame(name: str) -> float:
+        def first_frame(way: str) -> float:
             anew = with_new_meshes(scene)
             start = time.perf_counter()
-            frames[name] = Renderer(anew, "ldt", skip=made[name]).render()
+            frames[way] = Renderer(anew, "ldt", skip=made[way]).render()
             return time.perf_counter() - start
 
-        times, ratio = compared({name: functools.partial(first_frame, name) for name in made}, rounds)
+        times, ratio = compared({way: functools.partial(first_frame, way) for way in made}, rounds)
     else:
         # But to measure what is kept between frames, every frame is made anew.
         kept = () if skip == "frames" else ("frames",)
@@ -165,74 +208,79 @@ def ablate(scene: Scene, skip: str, rounds: int) -> dict[str, Any]:
             "with": Renderer(scene, "ldt", skip=all_but(*kept)),
             "without": Renderer(scene, "ldt", skip=all_but(*kept, skip)),
         }
-        firsts = {name: renderer.render() for name, renderer in renderers.items()}
+        firsts = {way: renderer.render() for way, renderer in renderers.items()}
         frames = {}
 
-        def next_frame(name: str) -> float:
+        def next_frame(way: str) -> float:
             start = time.perf_counter()
-            frames[name] = renderers[name].render()
+            frames[way] = renderers[way].render()
             whole = time.perf_counter() - start
-            stages = frames[name].stats.seconds
+            stages = frames[way].stats.seconds
             return whole if skip == "frames" else whole - sum(stages.get(stage, 0.0) for stage in OUTSIDE)
 
-        times, ratio = compared({name: functools.partial(next_frame, name) for name in renderers}, rounds)
+        times, ratio = compared({way: functools.partial(next_frame, way) for way in renderers}, rounds)
         if skip == "reflection":  # maps are made in the first frame
-            for name, first in firsts.items():
-                frames[name].stats.counters["objects_peeled"] = first.stats.counters.get("objects_peeled", 0)
+            for way, first in firsts.items():
+                frames[way].stats.counters["objects_peeled"] = first.stats.counters.get("objects_peeled", 0)
     counter = COUNTERS[skip]
     return {
+        "skip": skip,
+        "scene": name,
         "milliseconds": times,
         "ratio": ratio,
-        "counter": {name: frame.stats.counters.get(counter, 0) for name, frame in frames.items()},
+        "counter": {way: frame.stats.counters.get(counter, 0) for way, frame in frames.items()},
         "same": same(frames["with"], frames["without"]),
     }
 
 
-def moved(scene: Scene, rounds: int) -> dict[str, Any]:
-    """The heavy scene with its torus moved before every frame."""
+def moved(name: str, scene: Scene, rounds: int) -> SkipRow:
+    """What ``frames`` is worth in the heavy scene, called ``name``, where its torus moves before every frame."""
     renderers = {"with": Renderer(scene, "ldt"), "without": Renderer(scene, "ldt", skip=all_but("frames"))}
     frames: dict[str, Frame] = {}
     step = dict.fromkeys(renderers, 0)
 
-    def next_frame(name: str) -> float:
-        step[name] += 1
-        renderers[name].move("moved", translate=(-1.0, -1.2, 0.3 + 0.01 * step[name]))
+    def next_frame(way: str) -> float:
+        step[way] += 1
+        renderers[way].move("moved", translate=(-1.0, -1.2, 0.3 + 0.01 * step[way]))
         start = time.perf_counter()
-        frames[name] = renderers[name].render()
+        frames[way] = renderers[way].render()
         return time.perf_counter() - start
 
-    times, ratio = compared({name: functools.partial(next_frame, name) for name in renderers}, rounds)
+    times, ratio = compared({way: functools.partial(next_frame, way) for way in renderers}, rounds)
     return {
+        "skip": "frames",
+        "scene": f"{name}, torus moved",
         "milliseconds": times,
         "ratio": ratio,
-        "counter": {name: frame.stats.counters["rays"] for name, frame in frames.items()},
+        "counter": {way: frame.stats.counters["rays"] for way, frame in frames.items()},
         "same": same(frames["with"], frames["without"]),
     }
 
 
-def culling(scene: Scene, rounds: int) -> dict[str, Any] | None:
-    """Rays handed to the search against rays that enter a bounding sphere; pixels lost; what culling takes."""
-    options: dict[str, dict[str, Any]] = {
-        "none": {"skip": all_but("frames", "regions", "bounds")},
-        "safe": {"skip": all_but("frames")},
-        "flat": {"skip": all_but("frames"), "cull": "flat"},
+def culling(name: str, scene: Scene, rounds: int) -> CullingRow | None:
+    """Rays handed to the search against rays that enter a bounding sphere; pixels lost; what culling takes. None for a
+    scene without reflected rays."""
+    renderers = {
+        "none": Renderer(scene, "ldt", skip=all_but("frames", "regions", "bounds")),
+        "safe": Renderer(scene, "ldt", skip=all_but("frames")),
+        "flat": Renderer(scene, "ldt", skip=all_but("frames"), cull="flat"),
     }
-    renderers = {name: Renderer(scene, "ldt", **given) for name, given in options.items()}
-    frames = {name: renderer.render() for name, renderer in renderers.items()}
+    frames = {way: renderer.render() for way, renderer in renderers.items()}
     if not frames["safe"].stats.counters["rays"]:
         return None
     truth = frames["none"]
-    lost = {name: int((frame.image != truth.image).any(axis=2).sum()) for name, frame in frames.items()}
+    lost = {way: int((frame.image != truth.image).any(axis=2).sum()) for way, frame in frames.items()}
     share: dict[str, float] = {}
 
-    def cull(name: str) -> float:
-        seconds = renderers[name].render().stats.seconds
-        share[name] = seconds["cull"] / sum(seconds.values())
+    def cull(way: str) -> float:
+        seconds = renderers[way].render().stats.seconds
+        share[way] = seconds["cull"] / sum(seconds.values())
         return seconds["cull"]
 
-    times, _ = compared({name: functools.partial(cull, name) for name in ("safe", "flat")}, rounds)
+    times, _ = compared({way: functools.partial(cull, way) for way in ("safe", "flat")}, rounds)
     entering = rays_that_enter(renderers["safe"])
     return {
+        "scene": name,
         "rays": frames["safe"].stats.counters["rays"],
         "entering": entering,
         "handed": frames["safe"].stats.counters["searches"],
@@ -259,9 +307,22 @@ def rays_that_enter(renderer: Renderer) -> int:
     return count
 
 
-def table(result: dict[str, Any]) -> str:
+def typical_and_best(rows: list[SkipRow]) -> list[str]:
+    """Lines of a table: each skip's ratio in a typical scene (the median over all), in the best and in the worst."""
+    lines = ["Time with the skip over time without it: the median over the scenes, the best scene and the worst.", ""]
+    lines += ["| skip | typical | best | worst |", "|---|---|---|---|"]
+    for skip in skips.names():
+        ratios = sorted((row["ratio"], row["scene"]) for row in rows if row["skip"] == skip)
+        typical = statistics.median(ratio for ratio, _ in ratios)
+        (best, best_scene), (worst, worst_scene) = ratios[0], ratios[-1]
+        lines.append(f"| {skip} | {typical:.2f} | {best:.2f} ({best_scene}) | {worst:.2f} ({worst_scene}) |")
+    return lines
+
+
+def table(result: Result) -> str:
     """The result in Markdown."""
-    lines = ["# What each skip is worth", "", f"{result['threads']} threads; medians of {result['rounds']} rounds.", ""]
+    measured = f"Measured on {result['date']}, {result['threads']} threads; medians of {result['rounds']} rounds."
+    lines = ["# What each skip is worth", "", measured, "", *typical_and_best(result["skips"]), "", "## By scene", ""]
     lines += ["| skip | scene | with, ms | without, ms | ratio | counter | with | without | same picture |"]
     lines += ["|---|---|---|---|---|---|---|---|---|"]
     for row in result["skips"]:
@@ -270,22 +331,16 @@ def table(result: dict[str, Any]) -> str:
             f"| {row['skip']} | {row['scene']} | {times['with']:.2f} | {times['without']:.2f} | {row['ratio']:.2f} | "
             f"{COUNTERS[row['skip']]} | {counter['with']} | {counter['without']} | {'yes' if row['same'] else 'NO'} |"
         )
-    lines += ["", "## Best and worst of each", "", "| skip | best | median | worst |", "|---|---|---|---|"]
-    for skip in skips.names():
-        rows = sorted((row["ratio"], row["scene"]) for row in result["skips"] if row["skip"] == skip)
-        middle = statistics.median(ratio for ratio, _ in rows)
-        best, worst = rows[0], rows[-1]
-        lines.append(f"| {skip} | {best[0]:.2f} ({best[1]}) | {middle:.2f} | {worst[0]:.2f} ({worst[1]}) |")
     lines += ["", "## Culling", ""]
     lines += ["| scene | rays | enter a sphere | handed on | ratio | pixels lost: safe | flat | safe, ms | flat, ms |"]
     lines += ["|---|---|---|---|---|---|---|---|---|"]
-    for row in result["culling"]:
-        flat = f"{row['lost']['flat']} ({100.0 * row['lost']['flat'] / max(row['hits'], 1):.2f}% of hits)"
-        times = row["milliseconds"]
+    for found in result["culling"]:
+        flat = f"{found['lost']['flat']} ({100.0 * found['lost']['flat'] / max(found['hits'], 1):.2f}% of hits)"
+        times = found["milliseconds"]
         lines.append(
-            f"| {row['scene']} | {row['rays']} | {row['entering']} | {row['handed']} | "
-            f"{row['handed'] / max(row['entering'], 1):.2f} | {row['lost']['safe']} | {flat} | "
-            f"{times['safe']:.2f} ({100.0 * row['share_of_frame']:.1f}% of the frame) | {times['flat']:.2f} |"
+            f"| {found['scene']} | {found['rays']} | {found['entering']} | {found['handed']} | "
+            f"{found['handed'] / max(found['entering'], 1):.2f} | {found['lost']['safe']} | {flat} | "
+            f"{times['safe']:.2f} ({100.0 * found['share_of_frame']:.1f}% of the frame) | {times['flat']:.2f} |"
         )
     return "\n".join(lines) + "\n"
 
@@ -297,17 +352,24 @@ def main() -> None:
     parser.add_argument("-o", "--output", type=Path, default=ROOT / "tools" / "results", help="folder for the results")
     given = parser.parse_args()
     rounds = 2 if given.quick else 15
-    result: dict[str, Any] = {"threads": launch.thread_count(), "rounds": rounds, "skips": [], "culling": []}
+    today = datetime.date.today().isoformat()
+    result: Result = {
+        "date": today,
+        "threads": launch.thread_count(),
+        "rounds": rounds,
+        "skips": [],
+        "culling": [],
+    }
     for name, scene in scenes(given.quick).items():
         for skip in skips.names():
-            row = {"skip": skip, "scene": name, **ablate(scene, skip, rounds)}
+            row = ablate(name, scene, skip, rounds)
             result["skips"].append(row)
             print(f"{name}: {skip} {row['ratio']:.2f} {'same' if row['same'] else 'NOT THE SAME'}", flush=True)
         if name == "heavy knot":
-            result["skips"].append({"skip": "frames", "scene": "heavy knot, torus moved", **moved(scene, rounds)})
-        figures = culling(scene, rounds)
+            result["skips"].append(moved(name, scene, rounds))
+        figures = culling(name, scene, rounds)
         if figures is not None:
-            result["culling"].append({"scene": name, **figures})
+            result["culling"].append(figures)
     given.output.mkdir(parents=True, exist_ok=True)
     with written_whole(given.output / "ablation.json") as scratch:
         scratch.write_text(json.dumps(result, indent=1) + "\n")
