@@ -12,7 +12,7 @@ from rich.table import Table
 
 from ldtrefl.compare.metrics import all_metrics
 from ldtrefl.compare.metrics.base import Comparison
-from ldtrefl.files.whole import written_whole
+from ldtrefl.files.atomic_write import written_whole
 from ldtrefl.frame.result import Frame
 from ldtrefl.renderer import Renderer
 from ldtrefl.scene.description import Scene

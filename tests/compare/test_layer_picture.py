@@ -4,7 +4,7 @@ import numpy as np
 
 import ldtrefl
 from ldtrefl.compare.layer_picture import FARTHEST_SHADE, LABEL_HEIGHT, MARGIN, draw_layers
-from ldtrefl.files.pictures import srgb_from_linear
+from ldtrefl.files.srgb import srgb_from_linear
 from ldtrefl.scene import shapes
 
 RESOLUTION = 32

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import ldtrefl
-from ldtrefl.cli.commands import main
+from ldtrefl.cli.program import main
 from ldtrefl.files.atomic_write import written_whole
 from ldtrefl.files.map_cache import MapCache
 from ldtrefl.scene import shapes

@@ -11,11 +11,12 @@ from ldtrefl.base.errors import InputError, printable
 from ldtrefl.cli.options import Device, Memory, SceneFile, Threads, parsed_settings, use_resources
 from ldtrefl.cli.printing import say, stage_times
 from ldtrefl.cli.progress import progress_bar
+from ldtrefl.compare.difference import difference_image
 from ldtrefl.compare.report import TEXEL_RESOLUTION, Row, compared, error_table, timed_frame, write_json
-from ldtrefl.files.pictures import difference_image, save_image
-from ldtrefl.files.whole import writable_folder
+from ldtrefl.files.atomic_write import writable_folder
+from ldtrefl.files.picture_writing import save_image
 from ldtrefl.methods import find_method
-from ldtrefl.scene.description import load_scene
+from ldtrefl.scene.load import load_scene
 
 PLACE_IN_HELP = 20
 

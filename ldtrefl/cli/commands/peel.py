@@ -12,7 +12,7 @@ from ldtrefl.cli.options import Device, Memory, Threads, mesh_or_shape, use_reso
 from ldtrefl.cli.printing import say
 from ldtrefl.compare.layer_picture import draw_layers
 from ldtrefl.device.launch import resolve_device
-from ldtrefl.files.pictures import check_writable, save_image
+from ldtrefl.files.picture_writing import check_writable, save_image
 from ldtrefl.ldt.texture import DEFAULT_RESOLUTION, peel_mesh
 from ldtrefl.world.device_mesh import DeviceMesh
 

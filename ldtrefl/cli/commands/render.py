@@ -17,10 +17,10 @@ from ldtrefl.cli.options import CacheFolder, Device, Memory, SceneFile, Threads,
 from ldtrefl.cli.printing import say, stage_times
 from ldtrefl.cli.progress import progress_bar
 from ldtrefl.files.map_cache import MapCache, keep_maps_in
-from ldtrefl.files.pictures import check_writable, save_image
+from ldtrefl.files.picture_writing import check_writable, save_image
 from ldtrefl.methods import find_method
 from ldtrefl.renderer import Renderer
-from ldtrefl.scene.description import load_scene
+from ldtrefl.scene.load import load_scene
 
 PLACE_IN_HELP = 10
 

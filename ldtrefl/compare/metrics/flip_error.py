@@ -6,7 +6,7 @@ import flip_evaluator
 import numpy as np
 
 from ldtrefl.compare.metrics.base import metric
-from ldtrefl.files.pictures import srgb_from_linear
+from ldtrefl.files.srgb import srgb_from_linear
 
 
 @metric("flip", heading="FLIP", format=".4f", place=30)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ldtrefl.compare.metrics.base import metric
-from ldtrefl.files.pictures import srgb_from_linear
+from ldtrefl.files.srgb import srgb_from_linear
 
 
 @metric("psnr", heading="PSNR", format=".1f", place=20)

@@ -6,7 +6,7 @@ import numpy as np
 from skimage.metrics import structural_similarity
 
 from ldtrefl.compare.metrics.base import metric
-from ldtrefl.files.pictures import srgb_from_linear
+from ldtrefl.files.srgb import srgb_from_linear
 
 WINDOW = 11
 """Pixels along a side of the Gaussian window."""

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ldtrefl.compare.metrics import flip
-from ldtrefl.files.pictures import linear_from_srgb
+from ldtrefl.files.srgb import linear_from_srgb
 from tests.compare.metrics.images import noise
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ldtrefl.compare.metrics import ssim
-from ldtrefl.files.pictures import linear_from_srgb
+from ldtrefl.files.srgb import linear_from_srgb
 from tests.compare.metrics.images import noise
 
 
