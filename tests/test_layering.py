@@ -3,6 +3,8 @@
 import ast
 import functools
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -117,3 +119,15 @@ ROOMS = [path.parent for path in PACKAGE.glob("*/__init__.py")]
 def test_a_room_says_what_it_is_for(room: Path) -> None:
     words = ast.get_docstring(ast.parse((room / "__init__.py").read_text())) or ""
     assert "Imports" in words and "Start with" in words, f"{room.name}: what it imports, and where to start reading"
+
+
+def test_the_package_loads_its_parts_when_they_are_used() -> None:
+    code = (
+        "import sys, ldtrefl; assert 'warp' not in sys.modules and 'numpy' not in sys.modules;"
+        "from ldtrefl.renderer import Renderer; "
+        "assert callable(ldtrefl.render) and callable(ldtrefl.peel) and ldtrefl.Renderer is Renderer;"
+        "assert set(ldtrefl.__all__) == set(ldtrefl._HOMES);"
+        "assert all(getattr(ldtrefl, name) is not None for name in dir(ldtrefl)); assert not hasattr(ldtrefl, 'nope')"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr

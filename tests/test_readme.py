@@ -1,19 +1,89 @@
-"""The README's commands and code are those that run here, and it lists every shape, method and skip."""
+"""README, docs/ and their kin: what they show runs as it stands, and what they name exists."""
 
+import inspect
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 import trimesh
 
 import ldtrefl
+from ldtrefl.cli import commands as command_files
 from ldtrefl.frame import skips
 from ldtrefl.methods import all_methods
 from ldtrefl.scene import shapes
+from tests import documents
+from tests.documents import PAGES, ROOT, Block
 
-ROOT = Path(__file__).parent.parent
+SCENE_REFERENCE = ROOT / "docs" / "scenes.md"
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder with the files that pages speak of."""
+    (tmp_path / "scenes").symlink_to(ROOT / "scenes")
+    knot = shapes.make("torus_knot")
+    trimesh.Trimesh(knot.vertices, knot.faces, process=False).export(tmp_path / "statue.ply")
+    ldtrefl.save_image(tmp_path / "wood.png", np.full((4, 4, 3), 0.5, np.float32))
+    return tmp_path
+
+
+def succeeds(arguments: list[str], folder: Path) -> None:
+    done = subprocess.run(arguments, cwd=folder, capture_output=True, text=True, check=False, timeout=300)
+    complaints = [line for line in done.stderr.splitlines() if not line.startswith("ldtrefl: compiling kernels")]
+    assert done.returncode == 0 and not complaints, done.stderr
+
+
+@pytest.mark.parametrize("block", documents.blocks("python"), ids=str)
+def test_python_runs_as_it_stands(block: Block, folder: Path) -> None:
+    before = set(folder.iterdir())
+    succeeds([sys.executable, "-c", block.code], folder)
+    written = {path.name for path in set(folder.iterdir()) - before}
+    expected = set(re.findall(r'(?:save_image|save)\("([^"]+)"', block.code))
+    assert expected <= written
+
+
+@pytest.mark.parametrize("block", documents.commands(), ids=str)
+def test_commands_run_as_they_stand(block: Block, folder: Path) -> None:
+    arguments = shlex.split(block.code)
+    succeeds([sys.executable, "-m", "ldtrefl", *arguments], folder)
+    if "-o" in arguments:
+        assert (folder / arguments[arguments.index("-o") + 1]).exists()
+
+
+def scene_of(block: Block) -> str:
+    """A scene file: the block, or the page's first one with the block added."""
+    first = next(other for other in documents.blocks("toml") if other.page == block.page)
+    return block.code if "[camera]" in block.code else first.code + block.code
+
+
+@pytest.mark.parametrize("block", documents.blocks("toml"), ids=str)
+def test_scenes_load(block: Block, folder: Path, caplog: pytest.LogCaptureFixture) -> None:
+    (folder / "scene.toml").write_text(scene_of(block))
+    scene = ldtrefl.load_scene(folder / "scene.toml")
+    assert scene.objects and not caplog.records
+
+
+def test_the_scene_reference_is_not_burnt_white(folder: Path) -> None:
+    """The newcomer's first picture: a statue, seen in a mirror ball, nothing of it clipped."""
+    first = next(block for block in documents.blocks("toml") if block.page == SCENE_REFERENCE)
+    (folder / "scene.toml").write_text(first.code)
+    frame = ldtrefl.render(ldtrefl.load_scene(folder / "scene.toml"))
+    assert (frame.image >= 1.0).any(axis=2).mean() < 1e-4
+    assert frame.reflector_mask.mean() > 0.1 and frame.image[frame.reflector_mask].mean() > 0.2
+    assert frame.hits is not None
+    seen = frame.hits.object[frame.reflector_mask] == 0
+    assert 0.01 < seen.mean() < 0.5
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_every_file_that_a_page_names_exists(page: Path) -> None:
+    missing = {str(path.relative_to(ROOT)) for path in documents.named_files(page) if not path.exists()}
+    assert not missing
 
 
 def test_ci_runs_the_readmes_test_command() -> None:
@@ -22,49 +92,38 @@ def test_ci_runs_the_readmes_test_command() -> None:
     assert command in ci.splitlines()
 
 
-def test_readme_names_only_files_that_exist() -> None:
+def test_every_page_of_docs_is_in_the_readme() -> None:
     readme = (ROOT / "README.md").read_text()
-    for name in ("docs/teapot.png", "docs/layers.png", "scenes/teapot.toml"):
-        assert name in readme and (ROOT / name).is_file()
+    assert all(f"`docs/{page.name}`" in readme for page in PAGES if page.parent == ROOT / "docs")
 
 
-def test_readme_lists_every_shape_and_method() -> None:
-    readme = (ROOT / "README.md").read_text()
-    assert all(f"`{name}`" in readme for name in [*shapes.names(), *all_methods()])
-
-
-def block(language: str) -> str:
-    """README's one block of code in this language, as it stands."""
-    (found,) = re.findall(rf"```{language}\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
-    return found
-
-
-def test_readmes_scene_is_not_burnt_white(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    """The newcomer's first picture shows a statue in a mirror ball, clips nothing, and gives no warning."""
-    knot = shapes.make("torus_knot")
-    trimesh.Trimesh(knot.vertices, knot.faces, process=False).export(tmp_path / "statue.ply")
-    (tmp_path / "scene.toml").write_text(block("toml"))
-    scene = ldtrefl.load_scene(tmp_path / "scene.toml")
-    frame = ldtrefl.render(scene)
-    assert (frame.image >= 1.0).any(axis=2).mean() < 1e-4
-    assert frame.reflector_mask.mean() > 0.1 and frame.image[frame.reflector_mask].mean() > 0.2
-    assert frame.hits is not None
-    seen = frame.hits.object[frame.reflector_mask] == 0
-    assert 0.01 < seen.mean() < 0.5
-    assert not caplog.records
-
-
-def test_readmes_python_runs_as_it_stands(tmp_path: Path) -> None:
-    (tmp_path / "scenes").symlink_to(ROOT / "scenes")
-    code = block("python") + (
-        "\nassert 3.0 < truth.t[0] < 5.0 and abs(hits.t[0] - truth.t[0]) < 1e-2"
-        "\nassert hits.t[1] == truth.t[1] == float('inf')"
+def test_lists_are_whole() -> None:
+    readme, scenes, skipped, program = (
+        (ROOT / name).read_text() for name in ("README.md", "docs/scenes.md", "docs/skips.md", "docs/command_line.md")
     )
-    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert done.returncode == 0 and done.stderr == "", done.stderr
-    assert (tmp_path / "teapot.exr").is_file()
+    assert all(f"| `{name}` |" in readme for name in all_methods())
+    assert all(f"| `{name}` |" in skipped for name in skips.names())
+    files = {path.stem for path in Path(command_files.__file__).parent.glob("*.py")} - {"__init__"}
+    assert all(f"| `{name}` |" in program for name in files)
+    for name in shapes.names():
+        (row,) = [line for line in scenes.splitlines() if line.startswith(f"| `{name}` |")]
+        for option, parameter in inspect.signature(shapes.all_shapes()[name].make).parameters.items():
+            value = str(list(parameter.default) if isinstance(parameter.default, tuple) else parameter.default).lower()
+            assert f"`{option} = {value}`" in row
 
 
-def test_readme_lists_every_skip() -> None:
-    readme = (ROOT / "README.md").read_text()
-    assert all(f"| `{name}` |" in readme for name in skips.names())
+def test_every_key_of_a_scene_is_in_the_reference() -> None:
+    text = SCENE_REFERENCE.read_text()
+    for kind in ("Camera", "Environment", "Lighting", "Light", "Object", "Material", "Reflection"):
+        for key in getattr(ldtrefl, kind).__dataclass_fields__:
+            assert re.search(rf"\b{key} = |`{key}`|\[object\.{key}\]", text), f"{kind}.{key}"
+
+
+def test_architecture_names_what_is_there() -> None:
+    """Classes, functions and fields, by names that the package has."""
+    page = (ROOT / "docs" / "architecture.md").read_text()
+    source = "\n".join(path.read_text() for path in (ROOT / "ldtrefl").rglob("*.py"))
+    quoted = re.findall(r"`([A-Za-z_][\w.]*?)(?:\(\))?`", page)
+    names = {name.rpartition(".")[2] for name in quoted if not name.endswith((".py", ".h", ".md"))}
+    missing = {name for name in names if not re.search(rf"\b(def|class) {name}\b|^    {name}: ", source, re.MULTILINE)}
+    assert names and not missing

@@ -1,10 +1,8 @@
-"""The program as a shell sees it: what is on its streams, its exit status, and what signals do to it."""
+"""The program as a shell sees it: what is on its streams, and its exit status."""
 
 import os
-import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -97,55 +95,3 @@ def test_what_is_no_regular_file(folder: Path, name: str) -> None:
         done = shell(f"timeout 20 {PROGRAM} {command} {name}", folder)
         assert done.returncode == 2 and len(done.stderr.splitlines()) == 1, done.stderr
         assert "regular file" in done.stderr
-
-
-@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-@pytest.mark.parametrize("delay", [0.0, 0.3, 1.0])
-def test_signals_end_it_without_a_traceback(folder: Path, number: int, status: int, delay: float) -> None:
-    """From the moment that our own code runs; before, the interpreter is starting."""
-    marked = (
-        # What a background job of a shell ignores, and its children with it, counts again.
-        "import signal; signal.signal(signal.SIGINT, signal.default_int_handler);"
-        "import sys; sys.argv = ['ldtrefl', 'compare', 'scene.toml', '--methods', 'ldt,bvh,envmap'];"
-        "import ldtrefl.__main__ as program; handle = program._handle;"
-        "program._handle = lambda *a: (handle(*a), print('ready', flush=True));"
-        "sys.exit(program.main())"
-    )
-    child = subprocess.Popen(
-        [sys.executable, "-c", marked],
-        cwd=folder,
-        text=True,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        env={**os.environ, "WARP_CACHE_PATH": str(folder / "kernels")},  # so that it is still compiling
-    )
-    assert child.stdout is not None and child.stdout.readline() == "ready\n"
-    time.sleep(delay)
-    child.send_signal(number)
-    _, said = child.communicate(timeout=60)
-    # Until everything is imported SIGTERM has nothing to tidy up, and ends the process by itself.
-    assert child.returncode in ({status, -number} if number == signal.SIGTERM else {status}), said
-    assert all(line.startswith("ldtrefl: compiling kernels") for line in said.splitlines()), said
-    assert not list(folder.rglob(".*"))
-
-
-def test_signals_that_the_caller_ignores_stay_ignored(folder: Path) -> None:
-    code = (
-        "import signal; [signal.signal(n, signal.SIG_IGN) for n in (signal.SIGHUP, signal.SIGINT)];"
-        "import ldtrefl.__main__ as program; program.main(); import os; os.kill(os.getpid(), signal.SIGHUP);"
-        "os.kill(os.getpid(), signal.SIGINT); print('still here')"
-    )
-    done = subprocess.run([sys.executable, "-c", code, "methods"], capture_output=True, text=True, check=False)
-    assert done.returncode == 0 and "still here" in done.stdout
-
-
-def test_the_package_loads_its_parts_when_they_are_used() -> None:
-    code = (
-        "import sys, ldtrefl; assert 'warp' not in sys.modules and 'numpy' not in sys.modules;"
-        "from ldtrefl.renderer import Renderer; "
-        "assert callable(ldtrefl.render) and callable(ldtrefl.peel) and ldtrefl.Renderer is Renderer;"
-        "assert set(ldtrefl.__all__) == set(ldtrefl._HOMES);"
-        "assert all(getattr(ldtrefl, name) is not None for name in dir(ldtrefl)); assert not hasattr(ldtrefl, 'nope')"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 import typer
 
+from ldtrefl.base import budget
 from ldtrefl.cli import commands
 from ldtrefl.cli.program import main
 from tests.cli.conftest import Done
@@ -83,3 +84,24 @@ def test_wrong_input_is_one_line(run: Callable[..., Done], scene_folder: Path, a
     done = run(*arguments.split())
     assert done.status == 2 and len(done.errors) == 1 and message in done.errors[0], done
     assert sorted(scene_folder.iterdir()) == before
+
+
+@pytest.mark.parametrize(
+    ("arguments", "variable", "status", "message"),
+    [
+        ("info scene.toml --memory 100K", "", 2, "needs 78.5 KiB beside 78.5 KiB"),
+        ("render scene.toml --memory much", "", 2, "--memory: expected a size"),
+        ("compare scene.toml --memory 9K", "1G", 2, "allowed are 9.0 KiB"),
+        ("peel torus --memory 9K", "", 2, "allowed are 9.0 KiB"),
+        ("info torus", "9K", 2, "allowed are 9.0 KiB"),
+        ("info scene.toml", "many", 2, "LDTREFL_MEMORY: expected a size"),
+        ("info scene.toml --memory 1G", "9K", 0, "memory: about 157.0 KiB"),
+    ],
+)
+def test_memory_that_is_allowed(
+    run: Callable[..., Done], monkeypatch: pytest.MonkeyPatch, arguments: str, variable: str, status: int, message: str
+) -> None:
+    monkeypatch.setenv(budget.VARIABLE, variable)
+    done = run(*arguments.split())
+    assert done.status == status and message in (" ".join(done.errors) if status else done.output), done
+    assert len(done.errors) == (1 if status else 0)

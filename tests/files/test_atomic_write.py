@@ -203,7 +203,7 @@ def test_nothing_is_left_behind_when_writing_fails(tmp_path: Path, monkeypatch: 
     def fail(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("ldtrefl.files.whole.os.replace", fail)
+    monkeypatch.setattr("ldtrefl.files.atomic_write.os.replace", fail)
     with pytest.raises(ldtrefl.InputError, match=r"a\.png: cannot be written \(No space left on device\)"):
         ldtrefl.save_image(tmp_path / "a.png", np.zeros((4, 4, 3), np.float32))
     assert list(tmp_path.iterdir()) == []

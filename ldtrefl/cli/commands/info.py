@@ -14,7 +14,7 @@ from ldtrefl.base.errors import printable
 from ldtrefl.cli.options import Memory, allow_memory, mesh_or_shape
 from ldtrefl.cli.printing import say
 from ldtrefl.device.launch import resolve_device, threading_note
-from ldtrefl.ldt.texture import peel_mesh
+from ldtrefl.ldt.peel import peel_mesh
 from ldtrefl.scene.description import Scene
 from ldtrefl.scene.load import load_scene
 from ldtrefl.scene.mesh import Mesh

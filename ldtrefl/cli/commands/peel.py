@@ -13,7 +13,8 @@ from ldtrefl.cli.printing import say
 from ldtrefl.compare.layer_picture import draw_layers
 from ldtrefl.device.launch import resolve_device
 from ldtrefl.files.picture_writing import check_writable, save_image
-from ldtrefl.ldt.texture import DEFAULT_RESOLUTION, peel_mesh
+from ldtrefl.ldt.options import DEFAULT_RESOLUTION
+from ldtrefl.ldt.peel import peel_mesh
 from ldtrefl.world.device_mesh import DeviceMesh
 
 PLACE_IN_HELP = 30
