@@ -20,9 +20,8 @@ FLOORS = (
     ("world",),
     ("tracing", "shading"),
     ("ldt", "frame"),
-    ("methods",),
+    ("methods", "compare"),
     ("renderer",),
-    ("compare",),
     ("cli",),
 )
 """Rooms from the ground up: folders and single files of the package. A room imports rooms of lower floors."""

@@ -13,12 +13,8 @@ from rich.table import Table
 from ldtrefl.compare.metrics import all_metrics
 from ldtrefl.compare.metrics.base import Comparison
 from ldtrefl.files.atomic_write import written_whole
+from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.result import Frame
-from ldtrefl.renderer import Renderer
-from ldtrefl.scene.description import Scene
-
-TEXEL_RESOLUTION = 256
-"""Resolution of the maps whose texel is the unit of distance errors, for methods that have no such maps."""
 
 
 @dataclass(frozen=True)
@@ -31,34 +27,25 @@ class Row:
     """Metric -> value; metrics that need what the method lacks are left out."""
 
 
-def timed_frame(
-    scene: Scene, method: str, device: str | None = None, options: Mapping[str, object] | None = None
-) -> tuple[Renderer, Frame]:
-    """A frame whose times hold every stage but compiling, and the renderer that made it.
-
-    A first frame, by a renderer of its own, compiles the kernels and is thrown away.
-
-    Raises:
-        InputError: an unknown method, option or device, or a value that is not allowed.
-    """
-    Renderer(scene, method, device, **(options or {})).render()
-    renderer = Renderer(scene, method, device, **(options or {}))
-    return renderer, renderer.render()
-
-
-def compared(frame: Frame, truth: Frame, renderer: Renderer, resolution: int = TEXEL_RESOLUTION) -> Row:
+def compared(frame: Frame, truth: Frame, texel_sizes: np.ndarray, gbuffer: GBuffer | None) -> Row:
     """Every metric of a frame.
 
     Args:
-        frame: the last frame that ``renderer`` made.
+        frame: the method's.
         truth: the true frame of the same scene and camera.
-        renderer: the one that made ``frame``.
-        resolution: of the method's maps, whose texel is the unit of distance errors.
+        texel_sizes: (objects,) world units: the length of a texel of each object's maps, the unit of distance errors.
+        gbuffer: what the camera saw.
     """
-    texels = renderer.texel_sizes(resolution)
-    mask, has_hits = truth.reflector_mask, frame.hits is not None and truth.hits is not None
-    gbuffer = renderer.gbuffer if has_hits else None
-    comparison = Comparison(frame.image, truth.image, mask, frame.hits, truth.hits, texels, gbuffer)
+    has_hits = frame.hits is not None and truth.hits is not None
+    comparison = Comparison(
+        frame.image,
+        truth.image,
+        truth.reflector_mask,
+        frame.hits,
+        truth.hits,
+        texel_sizes,
+        gbuffer if has_hits else None,
+    )
     values = {metric.name: metric.of(comparison) for metric in all_metrics()}
     return Row(frame.stats.seconds, {name: value for name, value in values.items() if value is not None})
 

@@ -4,13 +4,12 @@ import io
 import json
 from pathlib import Path
 
-import numpy as np
 import pytest
 from rich.console import Console
 
 import ldtrefl
 from ldtrefl.compare.metrics import all_metrics
-from ldtrefl.compare.report import Row, compared, error_table, timed_frame, write_json
+from ldtrefl.compare.report import Row, compared, error_table, write_json
 from tests.conftest import SMALL_SCENE
 
 
@@ -19,11 +18,10 @@ def rows(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Row]:
     path = tmp_path_factory.mktemp("scene") / "scene.toml"
     path.write_text(SMALL_SCENE)
     scene = ldtrefl.load_scene(path)
-    _, truth = timed_frame(scene, "bvh")
-    made = {}
+    truth, made = ldtrefl.render(scene, "bvh"), {}
     for method in ("ldt", "envmap"):
-        renderer, frame = timed_frame(scene, method)
-        made[method] = compared(frame, truth, renderer)
+        renderer = ldtrefl.Renderer(scene, method)
+        made[method] = compared(renderer.render(), truth, renderer.texel_sizes(256), renderer.gbuffer)
     return made
 
 
@@ -37,9 +35,10 @@ def test_every_metric_that_can_be_is_taken(rows: dict[str, Row]) -> None:
 def test_the_resolution_is_the_unit_of_distances(tmp_path: Path) -> None:
     (tmp_path / "scene.toml").write_text(SMALL_SCENE)
     scene = ldtrefl.load_scene(tmp_path / "scene.toml")
-    renderer, frame = timed_frame(scene, "ldt", options={"search": "linear", "resolution": 64})
-    _, truth = timed_frame(scene, "bvh")
-    coarse, fine = (compared(frame, truth, renderer, resolution).errors["p99"] for resolution in (64, 256))
+    renderer = ldtrefl.Renderer(scene, "ldt", search="linear", resolution=64)
+    frame, truth = renderer.render(), ldtrefl.render(scene, "bvh")
+    sizes = [renderer.texel_sizes(resolution) for resolution in (64, 256)]
+    coarse, fine = (compared(frame, truth, texels, renderer.gbuffer).errors["p99"] for texels in sizes)
     assert fine == pytest.approx(4 * coarse) and coarse > 0
 
 
@@ -63,10 +62,3 @@ def test_json_has_no_infinity(tmp_path: Path) -> None:
         "reference": "bvh",
         "ldt": {"seconds": {"march": 0.5}, "psnr": None, "p99": None, "ssim": 0.5},
     }
-
-
-def test_a_frame_that_is_timed_compiles_nothing_and_keeps_nothing(tmp_path: Path) -> None:
-    (tmp_path / "scene.toml").write_text(SMALL_SCENE)
-    renderer, frame = timed_frame(ldtrefl.load_scene(tmp_path / "scene.toml"), "ldt")
-    assert "frames_kept" not in frame.stats.counters and frame.stats.counters["objects_peeled"] == 1
-    assert np.array_equal(renderer.render().image, frame.image)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
 
@@ -12,13 +13,19 @@ from ldtrefl.cli.options import Device, Memory, SceneFile, Threads, parsed_setti
 from ldtrefl.cli.printing import say, stage_times
 from ldtrefl.cli.progress import progress_bar
 from ldtrefl.compare.difference import difference_image
-from ldtrefl.compare.report import TEXEL_RESOLUTION, Row, compared, error_table, timed_frame, write_json
+from ldtrefl.compare.report import Row, compared, error_table, write_json
 from ldtrefl.files.atomic_write import writable_folder
 from ldtrefl.files.picture_writing import save_image
+from ldtrefl.frame.result import Frame
 from ldtrefl.methods import find_method
+from ldtrefl.renderer import Renderer
+from ldtrefl.scene.description import Scene
 from ldtrefl.scene.load import load_scene
 
 PLACE_IN_HELP = 20
+
+TEXEL_RESOLUTION = 256
+"""Resolution of the maps whose texel is the unit of distance errors, for methods that have no such maps."""
 
 app = typer.Typer()
 
@@ -52,7 +59,7 @@ def compare(
             renderer, frame = timed_frame(loaded, name, device, options[name])
             resolution = options[name].get("resolution")
             texels = resolution if isinstance(resolution, int) else TEXEL_RESOLUTION
-            rows[name] = compared(frame, truth, renderer, texels)
+            rows[name] = compared(frame, truth, renderer.texel_sizes(texels), renderer.gbuffer)
             save_image(folder / f"{name}.png", frame.image)
             save_image(folder / f"{name}-difference.png", difference_image(frame.image, truth.image))
     write_json(folder / "compare.json", str(scene), reference, rows)
@@ -60,6 +67,21 @@ def compare(
     say(error_table(rows, printable(title)))
     say(f"{reference}: {sum(truth.stats.seconds.values()):.3f} s", stage_times(truth))
     say(f"images in {folder}")
+
+
+def timed_frame(
+    scene: Scene, method: str, device: str | None = None, options: Mapping[str, object] | None = None
+) -> tuple[Renderer, Frame]:
+    """A frame whose times hold every stage but compiling, and the renderer that made it.
+
+    A first frame, by a renderer of its own, compiles the kernels and is thrown away.
+
+    Raises:
+        InputError: an unknown method, option or device, or a value that is not allowed.
+    """
+    Renderer(scene, method, device, **(options or {})).render()
+    renderer = Renderer(scene, method, device, **(options or {}))
+    return renderer, renderer.render()
 
 
 def _options_by_method(settings: list[str] | None, names: list[str]) -> dict[str, dict[str, object]]:

@@ -4,7 +4,12 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
+
+import ldtrefl
+from ldtrefl.cli.commands.compare import timed_frame
 from tests.cli.conftest import Done
+from tests.conftest import SMALL_SCENE
 
 
 def test_it_writes_pictures_and_errors(run: Callable[..., Done], scene_folder: Path) -> None:
@@ -25,3 +30,10 @@ def test_any_method_may_be_the_truth(run: Callable[..., Done], scene_folder: Pat
     done = run("compare", "scene.toml", "--reference", "ldt", "--methods", "ldt")
     assert done.status == 0 and (scene_folder / "scene-compare" / "ldt-difference.png").is_file()
     assert json.loads((scene_folder / "scene-compare" / "compare.json").read_text())["ldt"]["psnr"] is None
+
+
+def test_a_frame_that_is_timed_compiles_nothing_and_keeps_nothing(tmp_path: Path) -> None:
+    (tmp_path / "scene.toml").write_text(SMALL_SCENE)
+    renderer, frame = timed_frame(ldtrefl.load_scene(tmp_path / "scene.toml"), "ldt")
+    assert "frames_kept" not in frame.stats.counters and frame.stats.counters["objects_peeled"] == 1
+    assert np.array_equal(renderer.render().image, frame.image)
