@@ -45,13 +45,12 @@ def commands() -> list[Block]:
 
 def named_files(page: Path) -> set[Path]:
     """Files that a page names: links, and words with a slash and an ending of ours, by their path from the top of the
-    repository or of the package. ``NAME`` stands for any name."""
+    repository or of the package, or from the page's folder. ``NAME`` stands for any name."""
     text = re.sub(r"^```.*?^```", "", page.read_text(), flags=re.DOTALL | re.MULTILINE)
     links = {(page.parent / link).resolve() for link in re.findall(r"\]\((?!https?:)([^)#]+)", text)}
     text = re.sub(r"\]\([^)]*\)", "", text)
     words = re.findall(r"(?<![\w/.~-])((?:[\w.-]+/)+[\w.-]*\.(?:py|md|toml|json|png|h)|[A-Z]+\.md)\b", text)
     words += re.findall(r"`((?:[\w.-]+/)+)`", text)
-    in_package = {word for word in words if (ROOT / "ldtrefl" / word).exists()}
-    return links | {
-        ROOT / "ldtrefl" / word if word in in_package else ROOT / word for word in words if "NAME" not in word
-    }
+    tops = (ROOT, ROOT / "ldtrefl", page.parent)
+    meant = {word: [top / word for top in tops if (top / word).exists()] for word in words if "NAME" not in word}
+    return links | {found[0] if found else ROOT / word for word, found in meant.items()}

@@ -80,7 +80,7 @@ def test_the_scene_reference_is_not_burnt_white(folder: Path) -> None:
     assert 0.01 < seen.mean() < 0.5
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_every_file_that_a_page_names_exists(page: Path) -> None:
     missing = {str(path.relative_to(ROOT)) for path in documents.named_files(page) if not path.exists()}
     assert not missing
