@@ -23,7 +23,7 @@ from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.history import FrameHistory, FrameParts, Reusable
 from ldtrefl.frame.reflected_light import ReflectedLight
 from ldtrefl.frame.result import SMALLER, BandedFrame, Frame, WholeFrame, rows_of
-from ldtrefl.frame.skips import chosen
+from ldtrefl.frame.skip_options import skip_options_of
 from ldtrefl.frame.visibility import BAND_PIXELS, draw_gbuffer, draw_in_bands
 from ldtrefl.methods import find_method
 from ldtrefl.methods.base import RaylessMethod, RayMethod
@@ -71,13 +71,13 @@ class Renderer:
         config = kind.configured(options)
         self._lock = threading.RLock()
         self._name, self._options = kind.name, dict(options)
-        self._skips = chosen(config.skip)
-        device_scene = DeviceScene(scene, launch.resolve_device(device), skip_attributes=self._skips.attributes)
+        self._skip = skip_options_of(config.skip)
+        device_scene = DeviceScene(scene, launch.resolve_device(device), skip_attributes=self._skip.attributes)
         self._device_scene = device_scene
         self._tracer = kind.scene_tracer(config)
         """Answers the rays of methods that have any, and the shadow rays of every method."""
         self._method = kind(device_scene, config, self._tracer)
-        self._history = FrameHistory(keeps=self._skips.frames)
+        self._history = FrameHistory(keeps=self._skip.frames)
         self._bytes_taken = 0
         """For the largest frame so far."""
 
@@ -106,7 +106,7 @@ class Renderer:
         with self._lock:
             before = self._device_scene
             scene = before.scene.with_object(name, **changes)
-            self._device_scene = DeviceScene(scene, before.device, before, skip_attributes=self._skips.attributes)
+            self._device_scene = DeviceScene(scene, before.device, before, skip_attributes=self._skip.attributes)
 
     def render(self, camera: Camera | None = None) -> Frame:
         """Render a frame, seen by ``camera`` or else by the scene's own.
@@ -195,7 +195,7 @@ class Renderer:
         shadow = self._shadow_tracer(gbuffer, stats)
         with stats.stage("shade", device):
             shaded = shade_gbuffer(gbuffer, shadow, starts_rays=isinstance(method, RayMethod))
-        if not gbuffer.reflector_pixels.shape[0] and self._skips.reflection:
+        if not gbuffer.reflector_pixels.shape[0] and self._skip.reflection:
             reflected = ReflectedLight(wp.empty(0, dtype=wp.vec3, device=device))
         elif isinstance(method, RayMethod):
             reflected = method.reflect_rays(gbuffer, shaded.rays, reusable, stats)

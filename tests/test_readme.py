@@ -13,7 +13,7 @@ import trimesh
 
 import ldtrefl
 from ldtrefl.cli import commands as command_files
-from ldtrefl.frame import skips
+from ldtrefl.frame.skip_options import skip_names
 from ldtrefl.methods import all_methods
 from ldtrefl.scene import shapes
 from tests import documents
@@ -102,7 +102,7 @@ def test_lists_are_whole() -> None:
         (ROOT / name).read_text() for name in ("README.md", "docs/scenes.md", "docs/skips.md", "docs/command_line.md")
     )
     assert all(f"| `{name}` |" in readme for name in all_methods())
-    assert all(f"| `{name}` |" in skipped for name in skips.names())
+    assert all(f"| `{name}` |" in skipped for name in skip_names())
     files = {path.stem for path in Path(command_files.__file__).parent.glob("*.py")} - {"__init__"}
     assert all(f"| `{name}` |" in program for name in files)
     for name in shapes.names():

@@ -29,7 +29,7 @@ import ldtrefl
 from ldtrefl.base.errors import InputError
 from ldtrefl.device import launch
 from ldtrefl.files.atomic_write import written_whole
-from ldtrefl.frame import skips
+from ldtrefl.frame.skip_options import skip_names
 from ldtrefl.frame.camera_shading import shade_gbuffer
 from ldtrefl.renderer import Frame, Renderer
 from ldtrefl.scene.description import Camera, Material, Object, Scene
@@ -180,7 +180,7 @@ def compared(jobs: dict[str, Callable[[], float]], rounds: int) -> tuple[dict[st
 
 def all_but(*names: str) -> list[str]:
     """Every skip but these."""
-    return [name for name in skips.names() if name not in names]
+    return [name for name in skip_names() if name not in names]
 
 
 def same(a: Frame, b: Frame) -> bool:
@@ -191,7 +191,7 @@ def same(a: Frame, b: Frame) -> bool:
 def ablate(name: str, scene: Scene, skip: str, rounds: int) -> SkipRow:
     """Time and counter of the scene called ``name`` with a skip and without it."""
     if skip in ("maps", "attributes"):
-        made = {"with": skips.names(), "without": all_but(skip)}
+        made = {"with": skip_names(), "without": all_but(skip)}
         frames: dict[str, Frame] = {}
 
         def first_frame(way: str) -> float:
@@ -311,7 +311,7 @@ def typical_and_best(rows: list[SkipRow]) -> list[str]:
     """Lines of a table: each skip's ratio in a typical scene (the median over all), in the best and in the worst."""
     lines = ["Time with the skip over time without it: the median over the scenes, the best scene and the worst.", ""]
     lines += ["| skip | typical | best | worst |", "|---|---|---|---|"]
-    for skip in skips.names():
+    for skip in skip_names():
         ratios = sorted((row["ratio"], row["scene"]) for row in rows if row["skip"] == skip)
         typical = statistics.median(ratio for ratio, _ in ratios)
         (best, best_scene), (worst, worst_scene) = ratios[0], ratios[-1]
@@ -361,7 +361,7 @@ def main() -> None:
         "culling": [],
     }
     for name, scene in scenes(given.quick).items():
-        for skip in skips.names():
+        for skip in skip_names():
             row = ablate(name, scene, skip, rounds)
             result["skips"].append(row)
             print(f"{name}: {skip} {row['ratio']:.2f} {'same' if row['same'] else 'NOT THE SAME'}", flush=True)

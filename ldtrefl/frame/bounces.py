@@ -20,7 +20,7 @@ from ldtrefl.device.stats import Stats
 from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.regions import Regions
 from ldtrefl.frame.shadows import direct_radiance_of
-from ldtrefl.frame.skips import Skips
+from ldtrefl.frame.skip_options import SkipOptions
 from ldtrefl.geometry.vectors import point_along
 from ldtrefl.shading.environment import environment_radiance
 from ldtrefl.shading.specular import mirror_direction
@@ -153,7 +153,7 @@ class RayFollower:
     gbuffer: GBuffer
     guide: Guide
     max_bounces: int
-    skips: Skips
+    skip: SkipOptions
     stats: Stats
 
     def first_regions(self, rays: RayBuffer) -> Regions:
@@ -184,7 +184,7 @@ class RayFollower:
         with self.stats.stage("march", device):
             inputs = [rays, scene.records, tracer.views, regions.sets, hits]
             block = block_of(device)
-            kernel = closest_hits_kernel(tracer.tracer, block, self.skips.bounds)
+            kernel = closest_hits_kernel(tracer.tracer, block, self.skip.bounds)
             launch.launch(kernel, -(-count // block), inputs, device)
             self._count(rays, hits)
         with self.stats.stage("shade", device):
@@ -196,7 +196,7 @@ class RayFollower:
     def _needed(self, regions: Regions) -> set[int]:
         """The objects that the tracer must be ready for."""
         scene = self.gbuffer.scene
-        if self.skips.maps and not scene.lighting.shadows:
+        if self.skip.maps and not scene.lighting.shadows:
             return regions.shown
         return {entry.index for entry in scene.objects}
 

@@ -23,7 +23,7 @@ from ldtrefl.device.stats import Stats
 from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.history import Reusable
 from ldtrefl.frame.reflected_light import ReflectedLight
-from ldtrefl.frame.skips import Choice, chosen, names
+from ldtrefl.frame.skip_options import SkipChoice, skip_names, skip_options_of
 from ldtrefl.tracing.ray_buffers import RayBuffer
 from ldtrefl.tracing.scene_bvh import SceneBvh
 from ldtrefl.tracing.tracer import SceneTracer
@@ -39,7 +39,8 @@ class CommonConfig:
 
     # A description that classes inherit: attribute docstrings are the class's own.
     skip: Annotated[
-        Choice, Field(description=f"What is left out: all that can be, none, or a list of {', '.join(names())}.")
+        SkipChoice,
+        Field(description=f"What is left out: all that can be, none, or a list of {', '.join(skip_names())}."),
     ] = "all"
 
 
@@ -55,7 +56,7 @@ class Method(abc.ABC):
         self.config = config
         self.tracer = tracer
         """The renderer's."""
-        self.skips = chosen(config.skip)
+        self.skip = skip_options_of(config.skip)
 
     @classmethod
     def scene_tracer(cls, config: CommonConfig) -> SceneTracer:

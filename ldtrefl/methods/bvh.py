@@ -46,7 +46,7 @@ class Bvh(RayMethod):
     ) -> ReflectedLight:
         """Trace every reflected ray."""
         bounces = self.config.max_bounces or self.scene.scene.reflection.max_bounces
-        follower = RayFollower(gbuffer, self, bounces, self.skips, stats)
+        follower = RayFollower(gbuffer, self, bounces, self.skip, stats)
         followed = follower.follow(rays, follower.first_regions(rays))
         hits = FirstHits.of(gbuffer, followed)
         return ReflectedLight(summed_by_pixel(gbuffer.reflector_pixels, rays, followed.radiance), hits)

@@ -119,7 +119,7 @@ class Ldt(RayMethod):
     ) -> ReflectedLight:
         """Cull, peel what is left on first need, march."""
         bounces = self.config.max_bounces or self.scene.scene.reflection.max_bounces
-        follower = RayFollower(gbuffer, self, bounces, self.skips, stats)
+        follower = RayFollower(gbuffer, self, bounces, self.skip, stats)
         regions = follower.first_regions(rays)
         chosen = dict(self.tracer.chosen)
         followed = self._followed_again(follower, rays, regions, reusable) or follower.follow(rays, regions)
@@ -184,7 +184,7 @@ class Ldt(RayMethod):
     def _culled(self, gbuffer: GBuffer, rays: RayBuffer, bounce: int, stats: Stats) -> Regions:
         """Which objects the rays of a bounce can meet."""
         is_flat = self.config.cull == "flat"
-        if not self.skips.regions or (is_flat and bounce > 0) or (not is_flat and not self._culling_pays()):
+        if not self.skip.regions or (is_flat and bounce > 0) or (not is_flat and not self._culling_pays()):
             return all_objects(self.scene)
         return flat_regions(gbuffer, rays, stats) if is_flat else safe_regions(gbuffer, rays, bounce, stats)
 

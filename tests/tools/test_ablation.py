@@ -5,7 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from ldtrefl.frame import skips
+from ldtrefl.frame.skip_options import skip_names
 
 ROOT = Path(__file__).parent.parent.parent
 
@@ -16,7 +16,7 @@ def test_ablation_writes_what_it_promises(tmp_path: Path) -> None:
     done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
     result = json.loads((tmp_path / "ablation.json").read_text())
-    assert {row["skip"] for row in result["skips"]} == set(skips.names())
+    assert {row["skip"] for row in result["skips"]} == set(skip_names())
     assert all(row["same"] for row in result["skips"])
     assert result["culling"] and all(row["handed"] > 0 for row in result["culling"])
     assert all(row["lost"]["safe"] == 0 for row in result["culling"])

@@ -6,14 +6,14 @@ import numpy as np
 import warp as wp
 
 from ldtrefl.device import launch
-from ldtrefl.frame import skips
+from ldtrefl.frame.skip_options import skip_names
 from ldtrefl.scene.description import Camera, Light, Material, Object, Scene
 from ldtrefl.tracing.batch import batch_kernel
 from ldtrefl.tracing.tracer import Tracer, array_of_views, block_of
 
 ROOT = Path(__file__).parent.parent.parent
 
-SKIPS_BUT_FRAMES = [name for name in skips.names() if name != "frames"]
+SKIPS_BUT_FRAMES = [name for name in skip_names() if name != "frames"]
 """Every skip but that of a frame which is the same as the last: so each frame is made anew, and can be timed."""
 
 

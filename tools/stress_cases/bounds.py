@@ -18,7 +18,7 @@ import numpy as np
 import warp as wp
 
 import ldtrefl
-from ldtrefl.frame import skips
+from ldtrefl.frame.skip_options import skip_names
 from ldtrefl.scene import shapes
 from ldtrefl.scene.description import Camera, Environment, Light, Lighting, Material, Object, Scene
 
@@ -43,7 +43,7 @@ OPTIONS: list[tuple[str, dict[str, Any]]] = [
     ("ldt", {"search": "linear", "resolution": 32, "linear_steps": 64, "max_bounces": 2}),
     ("ldt", {"error": 1.0}),
     ("ldt", {"cull": "flat"}),
-    *[("ldt", {"skip": [name for name in skips.names() if name != off]}) for off in skips.names()],
+    *[("ldt", {"skip": [name for name in skip_names() if name != off]}) for off in skip_names()],
     ("bvh", {"max_bounces": 2}),
     ("envmap", {"resolution": 16}),
 ]
