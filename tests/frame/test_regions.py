@@ -1,4 +1,4 @@
-"""Reflection regions: the paper's cone test and ours against brute force in float64, and the pictures."""
+"""Reflection regions: runs of rays against brute force in float64, and the pictures."""
 
 import numpy as np
 import pytest
@@ -6,66 +6,15 @@ import warp as wp
 
 import ldtrefl
 from ldtrefl.device import launch
-from ldtrefl.frame.flat_regions import shows_flat
 from ldtrefl.frame.regions import cull_runs
 from ldtrefl.scene.description import Camera, Material, Object, Scene
 from ldtrefl.tracing.object_sets import RUN
 from ldtrefl.tracing.ray_buffers import RayBuffer
 from ldtrefl.world.records import ObjectRecord
-from tests.conftest import SCENES
+from tests.frame.random_mirrors import meet, on_device, random_mirrors, reflected
 
 SPHERES = 50
 """Objects that every run of rays is tested against."""
-
-
-@launch.kernel
-def answer_flat(
-    first: int,
-    eye: wp.array(dtype=wp.vec3),
-    corners: wp.array2d(dtype=wp.vec3),
-    centre: wp.array(dtype=wp.vec3),
-    radius: wp.array(dtype=float),
-    flat_out: wp.array(dtype=int),
-):
-    """Ask of one mirror triangle whether it shows a sphere."""
-    i = first + wp.tid()
-    flat_out[i] = int(shows_flat(eye[i], corners[i, 0], corners[i, 1], corners[i, 2], centre[i], radius[i]))
-
-
-def unit(vectors: np.ndarray) -> np.ndarray:
-    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
-
-
-def on_device(vectors: np.ndarray) -> wp.array:
-    return wp.array(vectors.astype(np.float32), dtype=wp.vec3, device=launch.resolve_device(None))
-
-
-def random_mirrors(n: int, bend: float) -> dict[str, np.ndarray]:
-    """Eyes, and triangles of many sizes and places, their corner normals bent by up to ``bend``."""
-    rng = np.random.default_rng(11)
-    size = 10.0 ** rng.uniform(-3, 0.5, (n, 1, 1))
-    corners = rng.normal(size=(n, 1, 3)) + size * rng.normal(size=(n, 3, 3))
-    facet = unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
-    normals = unit(facet[:, None] + bend * rng.uniform(0, 1, (n, 1, 1)) * rng.normal(size=(n, 3, 3)))
-    return {"eye": 4 * rng.normal(size=(n, 3)), "corners": corners, "normals": normals, "facet": facet}
-
-
-def reflected(mirrors: dict[str, np.ndarray], samples: int, flat: bool) -> tuple[np.ndarray, np.ndarray]:
-    """(n, samples, 3) origins and unit directions of rays from random points of each triangle."""
-    n = len(mirrors["eye"])
-    weights = np.random.default_rng(12).dirichlet((0.7, 0.7, 0.7), (n, samples))
-    point = weights @ mirrors["corners"]
-    normal = unit(np.repeat(mirrors["facet"][:, None], samples, axis=1) if flat else weights @ mirrors["normals"])
-    view = unit(point - mirrors["eye"][:, None])
-    return point, view - 2 * (view * normal).sum(axis=-1, keepdims=True) * normal
-
-
-def meet(origins: np.ndarray, directions: np.ndarray, centre: np.ndarray, radius: np.ndarray) -> np.ndarray:
-    """Whether rays meet spheres; the last axis of the vectors goes, the others broadcast."""
-    offset = centre - origins
-    along = (offset * directions).sum(axis=-1)
-    aside = (offset**2).sum(axis=-1) - along**2
-    return ((offset**2).sum(axis=-1) <= radius**2) | ((aside <= radius**2) & (along > 0))
 
 
 @pytest.mark.parametrize("bend", [0.0, 0.05, 0.5, 3.0])
@@ -96,27 +45,6 @@ def test_no_ray_is_lost(bend: float) -> None:
     assert kept.sum() <= 1.01 * truth.sum(), "a run keeps what none of its rays meets"
 
 
-def test_flat_is_exact_for_flat_mirrors() -> None:
-    """Drops nothing that reflects, but for float32's roots; keeps little else: what lies in the infinite cone."""
-    n = 30_000
-    mirrors = random_mirrors(n, 0.0)
-    rng = np.random.default_rng(14)
-    centre, radius = 3 * rng.normal(size=(n, 3)), 10.0 ** rng.uniform(-2, 0.3, n)
-    vectors = [on_device(mirrors["eye"]), on_device(mirrors["corners"]), on_device(centre)]
-    radii = wp.array(radius.astype(np.float32), dtype=float, device=vectors[0].device)
-    flat = wp.zeros(n, dtype=int, device=vectors[0].device)
-    launch.launch(answer_flat, n, [*vectors, radii, flat], vectors[0].device)
-    truth = np.zeros(n, bool)
-    for part in range(0, n, 5000):
-        span = slice(part, part + 5000)
-        rays = reflected({name: values[span] for name, values in mirrors.items()}, 200, flat=True)
-        truth[span] = meet(*rays, centre[span, None], (1 - 1e-4) * radius[span, None]).any(axis=1)  # not by rounding
-    shown = flat.numpy() != 0
-    assert 0.02 < truth.mean() < 0.98
-    assert (truth & ~shown).mean() < 1e-4
-    assert (shown & ~truth).mean() < 0.02
-
-
 def two_object_scene(**reflector: object) -> Scene:
     return Scene(
         camera=Camera(eye=(0, -4, 1), look_at=(0, 0, 0), width=160, height=120, fov_y=35),
@@ -137,16 +65,6 @@ def test_culling_changes_no_pixel(segments: list[int]) -> None:
     assert counters["searches"] < counters["rays"] / 2 and everything.stats.counters["searches"] == counters["rays"]
     assert counters["searches"] + counters["searches_saved"] == counters["rays"]
     assert 0 < counters["triangles_culled"] < counters["triangles_tested"]
-
-
-def test_flat_loses_pixels_of_curved_mirrors() -> None:
-    """Why it is not the default: the normals turn within a triangle."""
-    scene = ldtrefl.load_scene(SCENES / "bowl_mirror.toml")
-    flat, safe = ldtrefl.render(scene, "ldt", cull="flat"), ldtrefl.render(scene, "ldt")
-    assert flat.hits is not None and safe.hits is not None
-    lost = (safe.hits.object >= 0) & (flat.hits.object < 0)
-    assert 0 < lost.sum() < 0.03 * (safe.hits.object >= 0).sum()
-    assert not ((flat.hits.object >= 0) & (safe.hits.object < 0)).any()
 
 
 @pytest.mark.parametrize("bounces", [1, 3])

@@ -1,0 +1,85 @@
+"""Reflected rays followed bounce by bounce, against closed forms; and the sums of several rays of one pixel."""
+
+import numpy as np
+import pytest
+import warp as wp
+
+import ldtrefl
+from ldtrefl.device import launch
+from ldtrefl.frame.bounces import summed_by_pixel
+from ldtrefl.tracing.ray_buffers import RayBuffer, empty_rays
+from tests.frame import flat_mirror
+
+
+@pytest.mark.parametrize("bounces", [1, 2, 3])
+def test_rays_between_two_mirrors_bring_the_known_radiance(bounces: int) -> None:
+    """The box mirrors, too: when the bounces are used up, it shows the environment alone."""
+    given = flat_mirror.scene(box_mirror=0.5)
+    # The box hides some of the ground; both are reflectors, so rays leave both.
+    scene = flat_mirror.on_device(given)
+    gbuffer, shaded = flat_mirror.seen_and_shaded(scene)
+    follower = flat_mirror.follower(gbuffer, bounces)
+    before = {name: getattr(shaded.rays, name).numpy().copy() for name in RayBuffer.vars}
+    followed = follower.follow(shaded.rays, follower.first_regions(shaded.rays))
+    expected, pixel = flat_mirror.reflection(given, bounces), shaded.rays.pixel.numpy()
+    place = np.argsort(pixel)
+    chosen = place[np.searchsorted(pixel[place], expected.pixels)]
+    np.testing.assert_array_equal(pixel[chosen], expected.pixels)
+    assert (expected.object == flat_mirror.BOX).sum() > 30 and np.isinf(expected.distance).sum() > 100
+    np.testing.assert_array_equal(followed.hits.object.numpy()[chosen], expected.object)
+    world_t = followed.hits.t.numpy()[chosen] / scene.device_units_per_world_unit
+    np.testing.assert_allclose(world_t, expected.distance, rtol=1e-5)
+    np.testing.assert_allclose(followed.radiance.numpy()[chosen], expected.radiance, rtol=2e-5)
+    for name, values in before.items():
+        np.testing.assert_array_equal(getattr(shaded.rays, name).numpy(), values, err_msg="rays stay as they started")
+
+
+def test_rays_and_searches_are_counted() -> None:
+    """One ray a pixel of the ground, which can meet the box alone: searched for if it enters the box's sphere."""
+    given = flat_mirror.scene()
+    gbuffer, shaded = flat_mirror.seen_and_shaded(flat_mirror.on_device(given))
+    follower = flat_mirror.follower(gbuffer)
+    follower.follow(shaded.rays, follower.first_regions(shaded.rays))
+    expected, counters = flat_mirror.reflection(given), follower.stats.counters
+    offset = np.array(given.objects[flat_mirror.BOX].translate) - expected.origin
+    along = (offset * expected.direction).sum(axis=1)
+    enters = (along > 0) & ((offset**2).sum(axis=1) - along**2 <= 3 * flat_mirror.BOX_HALF**2)
+    rays = shaded.rays.pixel.shape[0]
+    unclear = rays - len(expected.pixels)
+    assert counters["rays"] == rays == counters["searches"] + counters["searches_saved"]
+    assert enters.sum() - 3 <= counters["searches"] <= enters.sum() + unclear + 3
+
+
+def test_the_rays_of_a_pixel_are_summed_in_their_order_by_any_number_of_threads() -> None:
+    """Large radiances of both signs: every other order rounds to another sum."""
+    rng, device = np.random.default_rng(3), launch.resolve_device(None)
+    counts = rng.integers(1, 9, 4000)
+    pixels = rng.permutation(10_000)[:4000].astype(np.int32)
+    radiance = (10.0 ** rng.uniform(0, 8, (counts.sum(), 3)) * rng.choice([-1, 1], (counts.sum(), 3))).astype(
+        np.float32
+    )
+    rays = empty_rays(len(radiance), device)
+    rays.pixel = wp.array(np.repeat(pixels, counts), dtype=wp.int32, device=device)
+    expected = np.zeros((4000, 3), np.float32)
+    ends = np.cumsum(counts)
+    for k in range(8):  # the k-th ray of every pixel that has so many
+        has = counts > k
+        expected[has] += radiance[(ends - counts)[has] + k]
+    sums = []
+    for threads in (1, 2):
+        ldtrefl.set_threads(threads)
+        inputs = [
+            wp.array(pixels, dtype=wp.int32, device=device),
+            rays,
+            wp.array(radiance, dtype=wp.vec3, device=device),
+        ]
+        sums.append(summed_by_pixel(*inputs).numpy())
+    np.testing.assert_array_equal(sums[0], expected)
+    np.testing.assert_array_equal(sums[1], expected)
+
+
+def test_one_ray_a_pixel_is_its_sum() -> None:
+    device = launch.resolve_device(None)
+    rays, radiance = empty_rays(3, device), wp.array([(1, 2, 3)] * 3, dtype=wp.vec3, device=device)
+    rays.pixel = wp.array([5, 0, 9], dtype=wp.int32, device=device)
+    assert summed_by_pixel(rays.pixel, rays, radiance) is radiance
