@@ -1,15 +1,104 @@
-"""The closest hits of a frame's reflected rays: the nearest of what each object's own ray caster finds."""
+"""The closest hits over many objects, against slab tests of boxes in float64."""
+
+from __future__ import annotations
 
 import numpy as np
 import pytest
+import warp as wp
 
 import ldtrefl
+from ldtrefl.device import launch
+from ldtrefl.device.stats import Stats
 from ldtrefl.scene.description import Camera, Material, Object, Scene
+from ldtrefl.tracing.closest_hits import closest_hits_kernel
+from ldtrefl.tracing.object_sets import ObjectSets, bits_of, sets_of_runs
+from ldtrefl.tracing.ray_buffers import HitBuffer, RayBuffer, empty_hits
+from ldtrefl.tracing.scene_bvh import SceneBvh
+from ldtrefl.tracing.tracer import block_of
+from ldtrefl.world.device_scene import DeviceScene
+from tests.tracing.boxes import HALF, distances, rays_of, scene_of
+
+BOXES = 70
+"""Three words of bits, the last one short."""
+
+
+def found(scene: DeviceScene, rays: RayBuffer, sets: ObjectSets | None = None, *, bounds: bool = True) -> HitBuffer:
+    """Where rays end by ray casting."""
+    bvhs, count = SceneBvh(), rays.source.shape[0]
+    hits, block = empty_hits(count, scene.device), block_of(scene.device)
+    tracer = bvhs.bound(scene, set(range(len(scene.objects))), Stats())
+    sets = sets or sets_of_runs(wp.empty((0, 0), dtype=wp.uint32, device=scene.device))
+    kernel = closest_hits_kernel(tracer.tracer, block, bounds)
+    launch.launch(kernel, -(-count // block), [rays, scene.records, tracer.views, sets, hits], scene.device)
+    return hits
+
+
+def random_rays(count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Rays from outside that cross the region of the boxes."""
+    rng = np.random.default_rng(seed)
+    origins = rng.normal(size=(count, 3))
+    origins *= 8.0 / np.linalg.norm(origins, axis=1, keepdims=True)
+    directions = rng.uniform(-2.5, 2.5, (count, 3)) - origins
+    return origins, directions / np.linalg.norm(directions, axis=1, keepdims=True)
+
+
+@pytest.mark.parametrize("bounds", [True, False])
+def test_the_nearest_of_many_boxes(bounds: bool) -> None:
+    """The object that a ray leaves is not met, and a dead ray meets nothing."""
+    places = np.random.default_rng(0).uniform(-2.5, 2.5, (BOXES, 3))
+    scene, (origins, directions) = scene_of(places), random_rays(1000, 1)
+    t = distances(origins, directions, places)
+    source = np.where(np.isfinite(t).any(axis=1), t.argmin(axis=1), 0)
+    source[::5] = 13
+    source[::7] = -1
+    t[np.arange(1000), source] = np.where(source >= 0, np.inf, t[np.arange(1000), source])
+    t[source < 0] = np.inf
+    nearest, second = np.sort(t, axis=1)[:, :2].T
+    # Of two that are entered in one place up to rounding either may be met.
+    is_clear = np.isinf(second) | ~np.isclose(second, nearest, rtol=0.0, atol=1e-4)
+    expected = np.where(np.isfinite(nearest), t.argmin(axis=1), -1)
+    hits = found(scene, rays_of(scene, origins, directions, source), bounds=bounds)
+    agrees = hits.object.numpy() == expected
+    assert 200 < (expected[is_clear] >= 0).sum() and (agrees | ~is_clear).mean() > 0.998, "all but rays at edges"
+    met = agrees & (expected >= 0)
+    world_t = hits.t.numpy() / scene.device_units_per_world_unit
+    np.testing.assert_allclose(world_t[met], nearest[met], rtol=1e-5)
+    assert np.isinf(world_t[expected < 0][agrees[expected < 0]]).all()
+    assert (hits.triangle.numpy()[source < 0] == -1).all() and (hits.searches.numpy()[source < 0] == 0).all()
+    searches = hits.searches.numpy()[source >= 0]
+    assert (searches == BOXES - 1).all() if not bounds else searches.mean() < 0.2 * BOXES
+
+
+def test_only_objects_of_a_rays_set_are_met() -> None:
+    """Four boxes in a row along x; each ray may meet some of them."""
+    places = np.array([[x, 0.0, 0.0] for x in (1.0, 2.0, 3.0, 4.0)])
+    scene = scene_of(places)
+    allowed = [{0, 1, 2, 3}, {1, 3}, {3}, set()]
+    origins, directions = np.tile([-1.0, 0.01, 0.02], (4, 1)), np.tile([1.0, 0.0, 0.0], (4, 1))
+    sets = ObjectSets()
+    sets.bits = wp.array(np.stack([bits_of(s, 4) for s in allowed]), dtype=wp.uint32, device=scene.device)
+    sets.rows = wp.array([0, 1, 2, 3], dtype=wp.int32, device=scene.device)
+    # A ray leaves an object that is not there to be met: the last one, which stands behind all that are met.
+    hits = found(scene, rays_of(scene, origins, directions, np.array([3, 0, 0, 0])), sets)
+    assert hits.object.numpy().tolist() == [0, 1, 3, -1]
+    expected = [2.0 - HALF, 3.0 - HALF, 5.0 - HALF, np.inf]
+    np.testing.assert_allclose(hits.t.numpy() / scene.device_units_per_world_unit, expected, rtol=1e-6)
+    assert hits.searches.numpy().tolist() == [1, 1, 1, 0], "what is entered first is searched first"
+
+
+@pytest.mark.parametrize("bounds", [True, False])
+def test_of_objects_in_one_place_the_first_is_met(bounds: bool) -> None:
+    scene, count = scene_of(np.zeros((5, 3))), 90
+    origins, directions = random_rays(count, 2)
+    directions = -origins / np.linalg.norm(origins, axis=1, keepdims=True)
+    source = np.arange(count) % 5
+    hits = found(scene, rays_of(scene, origins, directions, source), bounds=bounds)
+    assert hits.object.numpy().tolist() == np.where(source == 0, 1, 0).tolist()
 
 
 @pytest.mark.parametrize("objects", [10, 40])
 @pytest.mark.parametrize("skip", ["all", "none"])
-def test_the_nearest_object_is_met(objects: int, skip: str) -> None:
+def test_rays_of_a_frame_end_where_each_objects_own_caster_says(objects: int, skip: str) -> None:
     """Objects in more than one word of bits, with and without what culls them; none is moved or scaled."""
     rng = np.random.default_rng(0)
     ball = Object(shape="sphere", params={"segments": [24, 12]}, material=Material(mirror=1.0))

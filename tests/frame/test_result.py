@@ -1,0 +1,119 @@
+"""Frames: what is made when it is asked for, once, as the caller's own; whole and in bands."""
+
+import dataclasses
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+import warp as wp
+
+import ldtrefl
+from ldtrefl.base import budget
+from ldtrefl.device import launch
+from ldtrefl.device.stats import Stats
+from ldtrefl.frame import visibility
+from ldtrefl.frame.camera_shading import shade_gbuffer
+from ldtrefl.frame.first_hits import FirstHits
+from ldtrefl.frame.gbuffer import GBuffer
+from ldtrefl.frame.history import FrameParts
+from ldtrefl.frame.reflected_light import ReflectedLight
+from ldtrefl.frame.result import BandedFrame, Frame, WholeFrame, rows_of
+from ldtrefl.frame.visibility import draw_in_bands
+from ldtrefl.tracing.nothing import no_shadows
+from tests.frame import flat_mirror
+
+
+class CountedSource:
+    """Gives pictures, and counts how often it is asked."""
+
+    def __init__(self) -> None:
+        self.asked: list[str] = []
+
+    def reflection(self) -> np.ndarray:
+        self.asked.append("reflection")
+        return np.ones((2, 3, 3), np.float32)
+
+    def reflector_mask(self) -> np.ndarray:
+        self.asked.append("reflector_mask")
+        return np.ones((2, 3), bool)
+
+    def hits(self) -> FirstHits | None:
+        self.asked.append("hits")
+        return None
+
+
+def test_what_a_frame_gives_is_made_once_and_when_it_is_asked_for() -> None:
+    source = CountedSource()
+    frame = Frame(np.zeros((2, 3, 3), np.float32), Stats(), source)
+    assert source.asked == []
+    assert frame.reflection is frame.reflection and frame.reflector_mask is frame.reflector_mask
+    assert frame.hits is None and frame.hits is None
+    assert source.asked == ["reflection", "reflector_mask", "hits"]
+
+
+def test_a_whole_frame_has_radiance_at_its_pixels() -> None:
+    device = launch.resolve_device(None)
+    pixels = wp.array([4, 1], dtype=wp.int32, device=device)
+    radiance = wp.array([(1, 2, 3), (4, 5, 6)], dtype=wp.vec3, device=device)
+    reflector = wp.array([0, 1, 0, 0, 1, 0], dtype=wp.uint8, device=device)
+    whole = WholeFrame((2, 3), pixels, radiance, reflector, None)
+    expected = np.zeros((2, 3, 3), np.float32)
+    expected[1, 1], expected[0, 1] = (1, 2, 3), (4, 5, 6)
+    np.testing.assert_array_equal(whole.reflection(), expected)
+    assert whole.reflector_mask().tolist() == [[False, True, False], [False, True, False]] and whole.hits() is None
+    whole.reflector_mask()[:] = True
+    assert reflector.numpy().tolist() == [0, 1, 0, 0, 1, 0], "the mask is the caller's"
+
+
+def parts_of(gbuffer: GBuffer, *, has_rays: bool = True) -> FrameParts:
+    """A band, its reflections by ray casting."""
+    shaded = shade_gbuffer(gbuffer, no_shadows(gbuffer.scene.device), starts_rays=True)
+    follower = flat_mirror.follower(gbuffer)
+    followed = follower.follow(shaded.rays, follower.first_regions(shaded.rays))
+    hits = FirstHits.of(gbuffer, followed) if has_rays else None
+    return FrameParts(gbuffer, shaded, ReflectedLight(followed.radiance, hits), ())
+
+
+def banded(monkeypatch: pytest.MonkeyPatch, *, has_rays: bool = True) -> BandedFrame:
+    """The flat mirror's image in bands of 16 rows, of which the first see no mirror."""
+    scene = flat_mirror.on_device(flat_mirror.scene())
+    camera = scene.scene.camera
+    monkeypatch.setattr(visibility, "BAND_PIXELS", 16 * camera.width)
+
+    def bands() -> Iterator[FrameParts]:
+        for gbuffer in draw_in_bands(scene, camera):
+            yield parts_of(gbuffer, has_rays=has_rays)
+
+    mask = np.empty((camera.height, camera.width), bool)
+    for parts in bands():
+        mask[rows_of(parts.gbuffer)] = parts.gbuffer.reflector_mask
+    assert not mask[0].any() and mask[20].any() and mask[-10].any()
+    return BandedFrame(mask, bands)
+
+
+def test_bands_make_the_pictures_of_the_whole_image(monkeypatch: pytest.MonkeyPatch) -> None:
+    frame, expected = banded(monkeypatch), flat_mirror.reflection(flat_mirror.scene())
+    reflection, hits = frame.reflection(), frame.hits()
+    np.testing.assert_allclose(reflection.reshape(-1, 3)[expected.pixels], expected.radiance, rtol=2e-5)
+    assert (reflection[~frame.reflector_mask()] == 0.0).all()
+    assert hits is not None
+    np.testing.assert_allclose(hits.distance.ravel()[expected.pixels], expected.distance, rtol=1e-5)
+    np.testing.assert_array_equal(hits.object.ravel()[expected.pixels], expected.object)
+    assert (hits.object[~frame.reflector_mask()] == -1).all()
+
+
+def test_bands_of_a_method_without_rays_have_no_hits(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert banded(monkeypatch, has_rays=False).hits() is None
+
+
+def test_pictures_of_bands_that_need_too_much_memory_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    frame = banded(monkeypatch)
+    wide = dataclasses.replace(frame, mask=np.ones((4000, 4000), bool))
+    budget.set_memory_limit(150 << 20)
+    try:
+        with pytest.raises(ldtrefl.InputError, match=r"the reflection in an image of 4000 x 4000 pixels needs .*MiB"):
+            wide.reflection()
+        with pytest.raises(ldtrefl.InputError, match=r"the reflected rays of an image of 4000 x 4000 .*camera\.width"):
+            wide.hits()
+    finally:
+        budget.set_memory_limit()
