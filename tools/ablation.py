@@ -29,8 +29,8 @@ import ldtrefl
 from ldtrefl.base.errors import InputError
 from ldtrefl.device import launch
 from ldtrefl.files.atomic_write import written_whole
-from ldtrefl.frame.skip_options import skip_names
 from ldtrefl.frame.camera_shading import shade_gbuffer
+from ldtrefl.frame.skip_options import skip_names
 from ldtrefl.renderer import Frame, Renderer
 from ldtrefl.scene.description import Camera, Material, Object, Scene
 from ldtrefl.tracing.nothing import no_shadows

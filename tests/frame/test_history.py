@@ -88,23 +88,6 @@ def test_a_moved_object_moves_its_shadow() -> None:
     assert_as_fresh(renderer, renderer.render())
 
 
-def test_environment_maps_follow_a_move() -> None:
-    renderer = ldtrefl.Renderer(scene(), "envmap")
-    renderer.render()
-    renderer.move("torus", translate=(-1.2, -1.4, 0.4))
-    np.testing.assert_array_equal(renderer.render().image, ldtrefl.render(renderer.scene, "envmap").image)
-
-
-def test_environment_maps_turn_with_the_camera() -> None:
-    given_scene = scene()
-    renderer = ldtrefl.Renderer(given_scene, "envmap", resolution=64)
-    renderer.render()
-    turned = dataclasses.replace(given_scene.camera, up=(1.0, 0.0, 0.5))
-    assert (
-        difference(renderer.render(turned), ldtrefl.Renderer(given_scene, "envmap", resolution=64).render(turned)) == ""
-    )
-
-
 @pytest.fixture(scope="module")
 def picture(tmp_path_factory: pytest.TempPathFactory) -> str:
     return sky(tmp_path_factory.mktemp("sky"))

@@ -7,9 +7,13 @@ import pytest
 
 import ldtrefl
 from ldtrefl.compare.metrics import reprojection_errors
+from ldtrefl.device import launch
+from ldtrefl.ldt.options import FEWEST_TEXELS, MOST_TEXELS
+from ldtrefl.ldt.resolution import TEXEL, resolutions_for
 from ldtrefl.renderer import Renderer
 from ldtrefl.scene import shapes
 from ldtrefl.scene.description import Camera, Material, Object, Scene
+from ldtrefl.world.device_scene import DeviceScene
 
 
 def scene(distance: float) -> Scene:
@@ -27,9 +31,45 @@ def scene(distance: float) -> Scene:
     )
 
 
+def boxes() -> DeviceScene:
+    """Two boxes of one mesh, with sides of 2 and 6, and a ball; device space is not the world."""
+    camera = Camera(eye=(0, -50, 0), look_at=(0, 0, 0), width=4, height=4)
+    made = (
+        Object(shape="box"),
+        Object(shape="box", scale=3.0, translate=(9, 0, 0)),
+        Object(shape="sphere", translate=(-9, 0, 0)),
+    )
+    return DeviceScene(Scene(camera=camera, objects=made), launch.resolve_device(None))
+
+
+@pytest.mark.parametrize("search", ["exact", "linear"])
+@pytest.mark.parametrize("error", [0.5, 3.0])
+@pytest.mark.parametrize(
+    ("texels", "expected"),
+    [(90.0, 91), (91.0, 128), (127.9, 128), (129.0, 181), (3.0, FEWEST_TEXELS), (1e6, MOST_TEXELS)],
+)
+def test_texels_are_a_fixed_part_of_the_footprint(search: str, error: float, texels: float, expected: int) -> None:
+    """As many as fit along the longest side, rounded up to 2^(k/2): 64, 90.5, 128, 181.0, ..."""
+    scene = boxes()
+    assert scene.device_units_per_world_unit != 1.0
+    footprint = 2.0 * scene.device_units_per_world_unit / (TEXEL[search] * error * texels)
+    assert resolutions_for(error, search, scene, {0: footprint}) == {scene.objects[0].geometry: expected}
+
+
+def test_a_mesh_gets_the_finest_that_its_objects_need() -> None:
+    scene = boxes()
+    box, ball = scene.objects[0].geometry, scene.objects[2].geometry
+    unit = scene.device_units_per_world_unit / TEXEL["exact"]
+    # 2 / 0.02 = 100 and 6 / 0.03 = 200 texels; of the ball nothing is known.
+    footprints = {0: 0.02 * unit, 1: 0.03 * unit, 2: None}
+    assert resolutions_for(1.0, "exact", scene, footprints) == {box: 256, ball: FEWEST_TEXELS}
+    assert resolutions_for(1.0, "exact", scene, {1: None, 0: 0.02 * unit}) == {box: 128}
+    assert resolutions_for(1.0, "exact", scene, {0: 0.0}) == {box: FEWEST_TEXELS}
+
+
 def chosen(renderer: Renderer) -> int:
     """The resolution of the one object that is peeled, as the last frame used it."""
-    *_, maps = renderer._method.tracer._maps.values()  # those used last stand last
+    *_, maps = vars(renderer._tracer)["_maps"].values()
     return int(maps.resolution)
 
 

@@ -1,10 +1,13 @@
 """The maps of a scene: peeled when they are first needed, kept by resolution, and bound as a frame chooses them."""
 
+import dataclasses
+
 import pytest
 
 import ldtrefl
 from ldtrefl.device import launch
 from ldtrefl.device.stats import Stats
+from ldtrefl.ldt.options import DEFAULT_RESOLUTION
 from ldtrefl.ldt.scene_maps import RESOLUTIONS_KEPT, MapOptions, SceneMaps
 from ldtrefl.world.device_scene import DeviceScene
 
@@ -44,3 +47,39 @@ def test_coarser_maps_are_trusted_and_finer_ones_are_not_searched_exactly(scene:
         maps.bound(scene, {0}, Stats())
         assert key in maps._maps
     assert len(maps._maps) == 2
+
+
+def test_objects_share_the_maps_of_their_mesh_and_those_without_need_none() -> None:
+    """A ray is met by either box through the same maps; nothing of the torus is peeled, and nothing is met of it."""
+    camera = ldtrefl.Camera(eye=(0, -9, 0), look_at=(0, 0, 0), width=4, height=4)
+    boxes = [ldtrefl.Object(shape="box", scale=0.5, translate=(x, 0, 0)) for x in (-2.0, 2.0)]
+    torus = ldtrefl.Object(shape="torus", translate=(0, 4, 0))
+    twice = DeviceScene(ldtrefl.Scene(camera=camera, objects=(*boxes, torus)), launch.resolve_device(None))
+    maps, stats = SceneMaps(OPTIONS), Stats()
+    tracer = maps.bound(twice, {0, 1}, stats)
+    assert stats.counters["objects_peeled"] == 1 and maps.meshes_without_maps(twice) == 1
+    assert tracer.tracer.name == "exact" and tracer.views.shape == (3,)
+
+
+def test_what_was_peeled_for_other_frames_has_no_part_in_this_one(scene: DeviceScene) -> None:
+    maps, mesh = SceneMaps(OPTIONS), scene.objects[0].geometry
+    usual = maps.bound(scene, {0}, Stats())
+    maps.chosen = {mesh: 32}
+    coarse = maps.bound(scene, {0}, Stats())
+    assert coarse is not usual and maps._bound is not None and maps._bound.maps[mesh] is maps._maps[mesh, 32, True]
+    maps.chosen = {}
+    stats = Stats()
+    maps.bound(scene, {0}, stats)
+    assert maps._bound.maps[mesh] is maps._maps[mesh, 64, False] and "objects_peeled" not in stats.counters
+    # At a resolution that has not been peeled, and for rays that cannot meet it, the object is bound without maps.
+    maps.chosen = {mesh: 16}
+    maps.bound(scene, {1}, stats)
+    assert maps._bound.maps[mesh] is None and stats.counters["objects_peeled"] == 1
+
+
+def test_an_unusual_resolution_is_not_the_usual_one(scene: DeviceScene) -> None:
+    maps, mesh = SceneMaps(OPTIONS), scene.objects[0].geometry
+    assert maps.usual == 64 and SceneMaps(dataclasses.replace(OPTIONS, resolution=None)).usual == DEFAULT_RESOLUTION
+    maps.chosen = {mesh: 32}
+    maps.bound(scene, {0}, Stats())
+    assert not maps.has_usual_maps(scene, {0}) and maps.meshes_without_maps(scene) == 2

@@ -36,9 +36,9 @@ def test_every_mesh_has_one_tree_that_is_built_once(monkeypatch: pytest.MonkeyPa
 def test_a_moved_object_keeps_its_tree() -> None:
     mirror = Material(mirror=1.0)
     ball = Object(shape="sphere", params={"segments": [24, 12]}, material=mirror)
-    renderer = ldtrefl.Renderer(
-        Scene(camera=Camera(eye=(0, -5, 0), look_at=(0, 0, 0), width=4, height=4), objects=(ball, Object(name="box", shape="box", translate=(0, 3, 2)))), "bvh"
-    )
+    box = Object(name="box", shape="box", translate=(0, 3, 2))
+    camera = Camera(eye=(0, -5, 0), look_at=(0, 0, 0), width=4, height=4)
+    renderer = ldtrefl.Renderer(Scene(camera=camera, objects=(ball, box)), "bvh")
     assert "build" in renderer.render().stats.seconds
     renderer.move("box", translate=(0, -3, 2))
     assert renderer.render().stats.seconds.get("build", 0.0) == 0.0
