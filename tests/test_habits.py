@@ -1,8 +1,4 @@
-"""How code reads here, as far as a program can tell: sizes of files and functions, docstrings, types, places of tests.
-
-What is not yet as it should be stands in ``still_to_mend.py``, by habit and file. An entry there that is mended fails
-too, so that the lists can only shrink; once all are empty, that file goes.
-"""
+"""How code reads here, as far as a program can tell: sizes of files and functions, docstrings, types, places of tests."""
 
 import ast
 import functools
@@ -11,8 +7,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-
-from tests.still_to_mend import STILL_TO_MEND
 
 ROOT = Path(__file__).parent.parent
 LONGEST_FILE = 400
@@ -245,13 +239,7 @@ HABITS: dict[str, tuple[Callable[[str], list[str]], list[str]]] = {
 def test_habit(habit: str) -> None:
     find, where = HABITS[habit]
     found = {path: sorted(names) for path in where if (names := find(path))}
-    listed = {path: sorted(names) for path, names in STILL_TO_MEND.get(habit, {}).items()}
-    new = {path: left for path, names in found.items() if (left := [n for n in names if n not in listed.get(path, [])])}
-    done = {
-        path: left for path, names in listed.items() if (left := [n for n in names if n not in found.get(path, [])])
-    }
-    assert not new, f"{habit}, but not here: {new}"
-    assert not done, f"{habit}: mended, so take it out of tests/still_to_mend.py: {done}"
+    assert not found, f"{habit}, but not here: {found}"
 
 
 def test_every_tool_stands_in_the_list_of_tools() -> None:
