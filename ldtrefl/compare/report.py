@@ -34,18 +34,10 @@ def compared(frame: Frame, truth: Frame, texel_sizes: np.ndarray, gbuffer: GBuff
         frame: the method's.
         truth: the true frame of the same scene and camera.
         texel_sizes: (objects,) world units: the length of a texel of each object's maps, the unit of distance errors.
-        gbuffer: what the camera saw.
+        gbuffer: what the camera saw; may be None for methods without rays.
     """
-    has_hits = frame.hits is not None and truth.hits is not None
-    comparison = Comparison(
-        frame.image,
-        truth.image,
-        truth.reflector_mask,
-        frame.hits,
-        truth.hits,
-        texel_sizes,
-        gbuffer if has_hits else None,
-    )
+    mask = truth.reflector_mask
+    comparison = Comparison(frame.image, truth.image, mask, frame.hits, truth.hits, texel_sizes, gbuffer)
     values = {metric.name: metric.of(comparison) for metric in all_metrics()}
     return Row(frame.stats.seconds, {name: value for name, value in values.items() if value is not None})
 

@@ -59,7 +59,8 @@ def compare(
             renderer, frame = timed_frame(loaded, name, device, options[name])
             resolution = options[name].get("resolution")
             texels = resolution if isinstance(resolution, int) else TEXEL_RESOLUTION
-            rows[name] = compared(frame, truth, renderer.texel_sizes(texels), renderer.gbuffer)
+            gbuffer = None if frame.hits is None else renderer.gbuffer  # drawn again for it if the image is large
+            rows[name] = compared(frame, truth, renderer.texel_sizes(texels), gbuffer)
             save_image(folder / f"{name}.png", frame.image)
             save_image(folder / f"{name}-difference.png", difference_image(frame.image, truth.image))
     write_json(folder / "compare.json", str(scene), reference, rows)
