@@ -38,10 +38,10 @@ LARGEST_WHOLE = 1 << 22
 """Pixels up to which an image is made as a whole: 2048 x 2048."""
 
 IMAGE_BYTES = 13
-"""Of a pixel of the result: its radiance, and whether it sees a reflector."""
+"""Bytes of a pixel of the result: its radiance, and whether it sees a reflector."""
 
 WORKING_BYTES = 200
-"""Of a pixel on the way: its key, what it sees, its radiance, its ray and where that ends."""
+"""Bytes of a pixel on the way: its key, what it sees, its radiance, its ray and where that ends."""
 
 
 class Renderer:
@@ -79,7 +79,7 @@ class Renderer:
         self._method = kind(device_scene, config, self._tracer)
         self._history = FrameHistory(keeps=self._skip.frames)
         self._bytes_taken = 0
-        """For the largest frame so far."""
+        """Memory that has been asked for: what the largest frame so far needs."""
 
     @property
     def scene(self) -> Scene:
@@ -112,7 +112,7 @@ class Renderer:
         """Render a frame, seen by ``camera`` or else by the scene's own.
 
         Raises:
-            InputError: ``camera`` is none, or the image needs more memory than is allowed.
+            InputError: ``camera`` is no Camera, or the image needs more memory than is allowed.
         """
         if not isinstance(camera, Camera | None):
             raise InputError(f"a Camera is needed, got {type(camera).__name__}")
@@ -190,7 +190,7 @@ class Renderer:
             yield self._parts(gbuffer, None, stats)
 
     def _parts(self, gbuffer: GBuffer, reusable: Reusable | None, stats: Stats) -> FrameParts:
-        """Direct light and reflections."""
+        """Shade what the camera sees, and let the method find the reflections in it."""
         method, device = self._method, gbuffer.scene.device
         shadow = self._shadow_tracer(gbuffer, stats)
         with stats.stage("shade", device):

@@ -67,7 +67,7 @@ def shade_hits_kernel(tracer: Tracer) -> wp.Kernel:
             if uv[0] < 0.0:
                 uv = extended_coordinates(objects[index], hits.triangle[i], point)
             surface = surface_at(objects, index, hits.triangle[i], uv[0], uv[1], direction)
-            # The ray's own point: a map's hit lies a little off the triangle.
+            # Shade at the point on the ray: what a map answers lies a little off the triangle.
             surface.position = point
             light = direct_radiance(views, objects, lighting, surface)
             if wp.max(surface.mirror) > 0.0:
@@ -90,7 +90,7 @@ def shade_hits_kernel(tracer: Tracer) -> wp.Kernel:
 def sum_rays(
     first: int,
     # In:
-    first_ray: wp.array(dtype=wp.int32),  # of each pixel, and one more
+    first_ray: wp.array(dtype=wp.int32),  # of each pixel; then the number of rays
     radiance: wp.array(dtype=wp.vec3),
     # Out:
     total_out: wp.array(dtype=wp.vec3),
@@ -137,11 +137,11 @@ class FollowedRays:
     """Rays of the first bounce, and what became of them."""
 
     rays: RayBuffer
-    """As they started."""
+    """The rays as they started."""
     sets: ObjectSets
     """The objects that each could meet."""
     hits: HitBuffer
-    """Where each ended first."""
+    """Where each ended at its first bounce."""
     radiance: wp.array
     """(n,) vec3 that each brings, by all of its bounces."""
 
@@ -178,7 +178,7 @@ class RayFollower:
         return followed
 
     def bounce(self, rays: RayBuffer, regions: Regions, hits: HitBuffer, radiance: wp.array, *, is_last: bool) -> int:
-        """Find where rays end and shade that; the number of rays that go on."""
+        """Find where rays end and shade that; returns the number of rays that go on."""
         scene, device, count = self.gbuffer.scene, self.gbuffer.scene.device, rays.pixel.shape[0]
         tracer = self.guide.traced(self._needed(regions), self.stats)
         with self.stats.stage("march", device):
@@ -210,7 +210,7 @@ class RayFollower:
         stats.count("searches_saved", alive * (len(self.gbuffer.scene.objects) - 1) - searches)
 
     def _copied(self, rays: RayBuffer) -> RayBuffer:
-        """The rays, to be sent on without changing these. Of a single bounce nothing but the source is written."""
+        """A copy of the rays, which bounces may change. A single bounce writes nothing but the source."""
         if self.max_bounces > 1:
             return cloned(RayBuffer, rays)
         going = RayBuffer()

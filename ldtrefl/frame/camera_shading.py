@@ -1,4 +1,4 @@
-"""Shading what the camera sees, all but what reflectors reflect; and starting the reflected rays there."""
+"""Shading of what the camera sees, without what reflectors reflect; and the start of the reflected rays."""
 
 from dataclasses import dataclass
 
@@ -46,7 +46,7 @@ def shade_pixels_kernel(tracer: Tracer) -> wp.Kernel:
 
 @wp.func
 def start_ray(rays: RayBuffer, i: int, surface: Surface, direction: wp.vec3):
-    """Let ray ``i`` leave a surface that is seen along unit ``direction``, mirrored."""
+    """Start ray ``i`` at a surface that is seen along unit ``direction``, in the mirrored direction."""
     rays.origin[i] = surface.position
     rays.direction[i] = mirror_direction(direction, surface.normal)
     rays.throughput[i] = wp.vec3(1.0)
@@ -90,7 +90,7 @@ def shade_reflectors_kernel(tracer: Tracer, starts_rays: bool) -> wp.Kernel:
 
 @dataclass(frozen=True, eq=False)
 class Shaded:
-    """What a camera sees, but for what reflectors reflect."""
+    """What the camera sees, without what reflectors reflect."""
 
     radiance: wp.array
     """(h * w,) vec3, reflections left out."""

@@ -129,7 +129,7 @@ def find_rows(
 
 
 def flat_regions(gbuffer: GBuffer, rays: RayBuffer, stats: Stats) -> Regions:
-    """Test the triangles of all reflectors for the rays of the first bounce; counts as ``safe_regions`` does."""
+    """Test the triangles of all reflectors for the rays of the first bounce. Counts what ``safe_regions`` counts."""
     scene, device, count = gbuffer.scene, gbuffer.scene.device, len(gbuffer.scene.objects)
     first_rows, total = scene.reflector_rows
     sets = ObjectSets()

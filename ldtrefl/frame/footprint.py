@@ -3,7 +3,7 @@
 A pixel's reflected ray and its neighbours' are some distance apart where they pass an object. That distance follows
 from the size of the reflection on the screen, the length of the ray, and the reflector's curvature.
 
-What is found depends on the frame alone: not on frames before, and not on what is skipped.
+The result depends on this frame alone: neither on earlier frames nor on the option ``skip``.
 """
 
 from __future__ import annotations
@@ -20,27 +20,28 @@ FINEST = 5.0
 """Percentile of an object's footprints that stands for all of them."""
 
 CANDIDATES = 65_536
-"""Rays of a frame that are tried for whether they meet an object."""
+"""The most rays of a frame that are tested for whether they meet an object."""
 
 SAMPLES = 4096
-"""Rays per object, of those that meet it, that are looked at."""
+"""The most rays that are looked at for an object, of those that meet it."""
 
 SURELY = 0.9999
-"""Of a bounding sphere's radius what a ray must meet to count: whoever culls by the whole of it has kept that ray."""
+"""A ray counts if it meets a sphere of this share of the bounding sphere's radius: culling, which tests the whole
+sphere, has surely kept that ray."""
 
 
 def footprint(rays: RayBuffer, width: int, runs: np.ndarray, entry: DeviceObject) -> float | None:
     """Distance between neighbouring pixels' rays at an object, device units; None if no two neighbours meet its sphere.
 
     Args:
-        rays: a ``RayBuffer``.
+        rays: the rays of one bounce.
         width: pixels in a row of the image.
         runs: (m,) numbers of the runs of rays that may meet the object.
     """
     pixel, source = rays.pixel.numpy(), rays.source.numpy()
     origin, direction = rays.origin.numpy(), rays.direction.numpy()
     numbers = rays_of(runs, len(pixel))
-    # Which rays are looked at must not depend on the runs that others are left out in.
+    # The choice of rays must not depend on which runs are left out.
     numbers = numbers[numbers % max(1, len(pixel) // CANDIDATES) == 0]
     numbers = numbers[(source[numbers] >= 0) & (source[numbers] != entry.index)]
     offset = np.array(entry.record.centre, float) - origin[numbers]
@@ -77,7 +78,7 @@ def finest_footprints(gbuffer: GBuffer, rays: RayBuffer, regions: Regions, *, is
     """Number of an object -> the smallest footprint on it, device units; None where none is known.
 
     Args:
-        rays: a bounce's.
+        rays: the rays of one bounce.
         regions: which objects they can meet; the others are left out.
         is_seen: whether what the camera itself sees counts, too; then no object is left out.
     """

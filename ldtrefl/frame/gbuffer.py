@@ -19,8 +19,8 @@ from ldtrefl.world.records import ObjectRecord
 from ldtrefl.world.unit_rays import unit_vertex
 
 LARGE_OBJECT = wp.constant(64.0)
-"""Radii of an object in distances from the eye from which what a pixel sees of it is taken from the pixel's ray: the
-rounding of barycentrics is then a hundred-thousandth of the distance, a hundredth of a pixel."""
+"""Where an object's radius is more than this many times its distance from the eye, the point that a pixel sees is found
+on the pixel's ray. Barycentrics are then rounded by a hundred-thousandth of the distance, a hundredth of a pixel."""
 
 
 @wp.struct
@@ -44,7 +44,7 @@ class PixelView:
 
 @wp.func
 def pixel_view(gbuffer: GBufferView, objects: wp.array(dtype=ObjectRecord), pixel: int) -> PixelView:
-    """How a pixel sees what it sees."""
+    """The line of sight of a pixel that sees an object."""
     index = gbuffer.object[pixel]
     corners = objects[index].faces[gbuffer.triangle[pixel]]
     u, v = gbuffer.barycentrics[pixel][0], gbuffer.barycentrics[pixel][1]

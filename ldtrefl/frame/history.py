@@ -4,7 +4,8 @@ Whether the camera is the same, and which objects have moved, is decided here an
 what stands still is drawn once and what moves is drawn over it; reflected rays that nothing has changed for are taken
 from the last frame (``refollow.py``); a frame in which nothing at all has changed is handed out again.
 
-What is kept changes at the end of a step and at once, so that a frame that is stopped on the way leaves no half of it.
+What is kept is replaced at once, at the end of a step, so that a frame that is stopped on the way leaves nothing half
+done.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ class FrameParts:
     shaded: Shaded
     reflected: ReflectedLight
     stages: tuple[str, ...]
-    """What was timed."""
+    """The names of the stages that were timed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +46,7 @@ class _View:
 
 @dataclass(frozen=True, eq=False)
 class _Still:
-    """A drawing of what stood still for a while."""
+    """A z-buffer of the objects that have stood still for some frames."""
 
     view: _View
     drawing: Drawing
@@ -69,11 +70,11 @@ class FrameHistory:
         """Keep nothing between frames unless ``keeps``."""
         self._keeps = keeps
         self._view: _View | None = None
-        """Of the last frame."""
+        """The scene and the camera of the last frame."""
         self._parts: FrameParts | None = None
         """The last frame, if it was made as a whole."""
         self._reflected: ReflectedLight | None = None
-        """What its rays met, for longer than the rest of it: the next frame may use that again."""
+        """What the last frame reflected. It is kept longer than ``_parts``: the next frame may use it again."""
         self._still: _Still | None = None
 
     @property

@@ -11,7 +11,8 @@ EDGE_SLACK = wp.constant(wp.float64(1.0e-6))
 """Pixels by which a triangle's box is widened, for centres that lie on its edge up to rounding."""
 
 GUARD = wp.constant(wp.float64(1 << 20))
-"""Pixels about the image within which a triangle is drawn in the plane; others are drawn homogeneous."""
+"""Triangles whose corners lie in front of the camera and have smaller coordinates than this, in pixels, are drawn by
+the planar test; all others by the homogeneous one."""
 
 
 @wp.struct

@@ -23,4 +23,4 @@ class ReflectedLight:
     followed: FollowedRays | None = None
     """Those rays, if the next frame may use them again."""
     resolutions: Mapping[DeviceMesh, int] = field(default_factory=dict)
-    """Texels of the maps that they were searched for in, by mesh: rays are used again only with the same."""
+    """By mesh, the resolution of the maps that the rays were searched for in. It must be the same to use them again."""

@@ -27,7 +27,7 @@ from ldtrefl.world.device_scene import DeviceScene
 from ldtrefl.world.records import ObjectRecord
 
 COSINE_SLACK = wp.constant(1.0e-5)
-"""By which cones are widened: a hundred roundings of a float32 dot product."""
+"""Cosines are lowered by this, which widens cones: a hundred roundings of a float32 dot product."""
 
 
 @wp.struct
@@ -35,7 +35,7 @@ class RunBounds:
     """A ball about the origins of some rays, and a cone about their directions."""
 
     middle: wp.vec3d
-    reach: float
+    reach: float  # radius of the ball
     axis: wp.vec3
     cosine: float  # of the cone's half-angle; -1 if nothing is known
 
@@ -66,7 +66,7 @@ def bounds_of_run(rays: RayBuffer, begin: int, end: int) -> RunBounds:
 @wp.func
 def may_meet(bounds: RunBounds, centre: wp.vec3d, radius: float) -> bool:
     """Whether a ray from the ball along a direction of the cone may meet a sphere; False only if none can."""
-    # To move all rays to the ball's middle widens the sphere.
+    # All rays are taken to start at the ball's middle; the sphere is widened for that by the ball's radius.
     towards = from_to(bounds.middle, centre)
     apart = wp.length(towards)
     widened = radius + bounds.reach
@@ -90,8 +90,8 @@ def cull_runs(
     first_rows: wp.array(dtype=wp.int32),
     # Out: bit k % 32 of word k / 32 is set if a ray of the run meets the sphere of object k
     bits_out: wp.array2d(dtype=wp.uint32),
-    # Out, if it is not empty: 1 for triangles of reflectors in a run that shows an object, the same from whoever writes
-    kept_out: wp.array(dtype=wp.uint8),
+    # Out, unless it is empty: 1 for the reflectors' triangles in runs that show an object, whoever writes it
+    shows_out: wp.array(dtype=wp.uint8),
 ):
     """Find the objects that the rays of one run can meet."""
     run = first + wp.tid()
@@ -115,9 +115,9 @@ def cull_runs(
                     i += 1
         bits_out[run, word] = bits
         shows_any = shows_any or bits != wp.uint32(0)
-    if shows_any and kept_out.shape[0] > 0:
+    if shows_any and shows_out.shape[0] > 0:
         for i in range(begin, end):
-            kept_out[first_rows[rays.source[i]] + pixel_triangle[rays.pixel[i]]] = wp.uint8(1)
+            shows_out[first_rows[rays.source[i]] + pixel_triangle[rays.pixel[i]]] = wp.uint8(1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +134,7 @@ def all_objects(scene: DeviceScene) -> Regions:
     """Every ray may meet every object but its own."""
     sets = sets_of_runs(wp.empty((0, 0), dtype=wp.uint32, device=scene.device))
     mirrors = {entry.index for entry in scene.reflectors}
-    # A mirror alone is met by no ray.
+    # All rays leave the only mirror, so none meets it.
     alone = mirrors if len(mirrors) == 1 else set()
     shown = set(range(len(scene.objects))) - alone if mirrors else set()
     return Regions(sets, shown)
@@ -143,17 +143,17 @@ def all_objects(scene: DeviceScene) -> Regions:
 def safe_regions(gbuffer: GBuffer, rays: RayBuffer, bounce: int, stats: Stats) -> Regions:
     """Test the rays of a bounce, 0 the first.
 
-    Counts ``triangles_tested``, those of all reflectors, and ``triangles_culled``, those that are not seen or that none
-    of the objects can be seen in.
+    Counts ``triangles_tested``, which are those of all reflectors, and ``triangles_culled``, which are those that the
+    camera does not see or in which no object can be seen.
     """
     scene, device = gbuffer.scene, gbuffer.scene.device
     runs, count = run_count(rays.source.shape[0]), len(scene.objects)
     bits = wp.empty((runs, word_count(count)), dtype=wp.uint32, device=device)
     first_rows, total = scene.reflector_rows
-    kept = wp.zeros(total if bounce == 0 else 0, dtype=wp.uint8, device=device)
-    inputs = [rays, scene.records, gbuffer.view.triangle, first_rows, bits, kept]
+    shows = wp.zeros(total if bounce == 0 else 0, dtype=wp.uint8, device=device)
+    inputs = [rays, scene.records, gbuffer.view.triangle, first_rows, bits, shows]
     launch.launch(cull_runs, runs, inputs, device)
     if bounce == 0:
         stats.count("triangles_tested", total)
-        stats.count("triangles_culled", total - int(np.count_nonzero(kept.numpy())))
+        stats.count("triangles_culled", total - int(np.count_nonzero(shows.numpy())))
     return Regions(sets_of_runs(bits), objects_in(bits.numpy(), count))

@@ -20,10 +20,10 @@ from ldtrefl.frame.history import FrameParts
 from ldtrefl.tracing.ray_buffers import HitBuffer, RayBuffer, joined
 
 HIT_BYTES = 112
-"""Of a pixel that sees a reflector: its ray and where that ends, joined from all bands."""
+"""Bytes for each pixel that sees a reflector: its ray and where that ends, joined from all bands."""
 
 SMALLER = "camera.width or camera.height"
-"""What takes less memory."""
+"""What an error names for the user to make smaller."""
 
 
 class FrameSource(Protocol):
@@ -74,8 +74,10 @@ class Frame:
 
 @dataclass(frozen=True, eq=False)
 class WholeFrame:
-    """The rest of a frame that was made as a whole. Arrays are copied: on the CPU ``numpy`` gives the memory that the
-    next frame may be made of."""
+    """What a frame that was made as a whole gives beside its image.
+
+    Arrays are copied: on the CPU ``numpy`` gives the memory itself, which the next frame may be made of.
+    """
 
     shape: tuple[int, int]
     pixels: wp.array
@@ -101,13 +103,13 @@ class WholeFrame:
         return np.array(self.reflector.numpy()).view(bool).reshape(self.shape)
 
     def hits(self) -> FirstHits | None:
-        """``Frame.hits``: the frame's own, for they keep the pictures that they have been asked for."""
+        """``Frame.hits``: a copy of this frame's own, for hits keep the pictures that they have been asked for."""
         return None if self.first_hits is None else dataclasses.replace(self.first_hits)
 
 
 @dataclass(frozen=True, eq=False)
 class BandedFrame:
-    """The rest of a frame that was made in bands: they are rendered again, which gives the same bits."""
+    """What a frame that was made in bands gives beside its image. The bands are rendered again, to the same bits."""
 
     mask: np.ndarray
     render_bands: Callable[[], Iterator[FrameParts]]

@@ -26,13 +26,14 @@ WIDE = wp.constant(3)
 faster than cut."""
 
 LEAST_AREA = wp.constant(wp.float64(4.0))
-"""Twice a triangle's square pixels from which the sign of its area is beyond rounding, and its rows are cut."""
+"""Twice the area, in square pixels, from which a triangle's rows are cut: rounding cannot change its sign."""
 
 LEAST_RISE = wp.constant(wp.float64(0.25))
-"""Rows that an edge crosses at least if rows are cut at it: flatter ones cross a row anywhere, up to rounding."""
+"""Rows are cut at edges that rise by more rows than this: where a flatter edge crosses a row is lost in rounding."""
 
 CUT_SLACK = wp.constant(wp.float64(1.0 / 64.0))
-"""Pixels by which rows are cut too long: twice the rounding at edges ``2 * GUARD`` long that rise by ``LEAST_RISE``."""
+"""Pixels by which cut rows are left too long: twice the rounding at an edge ``2 * GUARD`` long that rises by
+``LEAST_RISE``."""
 
 
 @wp.struct
@@ -59,7 +60,8 @@ def keep_nearest(mesh: ProjectedMesh, triangle: int, x: int, y: int, nearness: f
 
 @wp.func
 def row_bounds(p: wp.vec3d, q: wp.vec3d, area: wp.float64) -> wp.vec4d:
-    """What an edge leaves of row y: from ``[0] + [1] y`` to ``[2] + [3] y``. ``area`` is the triangle's, twice."""
+    """The part of row y on the inner side of an edge: from x = ``[0] + [1] y`` to ``[2] + [3] y``. ``area`` is twice
+    the triangle's."""
     rise = q[1] - p[1]
     bounds = wp.vec4d(-GUARD, BEHIND, GUARD, BEHIND)
     if wp.abs(rise) > LEAST_RISE and wp.abs(area) > LEAST_AREA:

@@ -1,7 +1,7 @@
 """Primary visibility: which point of which triangle each pixel sees.
 
-A z-buffer over homogeneous triangles (``zbuffer.py``). Against casting rays through a BVH it needs no BVH, whose build
-alone costs more than drawing once; ``tools/gbuffer_choice.py`` measures both. A large image is made in bands.
+It is found by a z-buffer (``zbuffer.py``). To cast rays instead would need a BVH, whose build alone costs more than
+drawing once; ``tools/gbuffer_choice.py`` measures both. A large image is made in bands.
 """
 
 from __future__ import annotations

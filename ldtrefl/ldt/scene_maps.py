@@ -19,8 +19,8 @@ from ldtrefl.world.device_mesh import DeviceMesh
 from ldtrefl.world.device_scene import DeviceScene
 
 RESOLUTIONS_KEPT = 4
-"""Of a mesh, maps of so many resolutions are kept: a camera that comes near and goes back peels nothing twice. The
-price of using exactly what is chosen is to peel a mesh again where finer maps would have done."""
+"""Resolutions at which the maps of a mesh are kept: a camera that comes near and goes back peels nothing twice. A frame
+uses exactly what is chosen for it. The price is that a mesh is peeled again where finer maps would have done."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class _Bound:
     """A tracer, and what it was made of."""
 
     maps: dict[DeviceMesh, LayeredDepthTexture | None]
-    """Of each mesh; None where none are needed."""
+    """The maps of each mesh; None where none are needed."""
     tracer: BoundTracer
     views: list[object]
     """They own what the tracer points to."""

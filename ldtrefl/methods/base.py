@@ -37,7 +37,7 @@ CONFIG = ConfigDict(extra="forbid", use_attribute_docstrings=True)
 class CommonConfig:
     """What every method's ``Config`` begins with."""
 
-    # A description that classes inherit: attribute docstrings are the class's own.
+    # Described by ``Field``, because the classes that come from this one inherit no attribute docstrings.
     skip: Annotated[
         SkipChoice,
         Field(description=f"What is left out: all that can be, none, or a list of {', '.join(skip_names())}."),
@@ -55,7 +55,7 @@ class Method(abc.ABC):
         self.scene = scene
         self.config = config
         self.tracer = tracer
-        """The renderer's."""
+        """The renderer's tracer."""
         self.skip = skip_options_of(config.skip)
 
     @classmethod
@@ -109,7 +109,8 @@ class RaylessMethod(Method):
     @abc.abstractmethod
     def reflect(self, gbuffer: GBuffer, stats: Stats) -> wp.array:
         """(m,) vec3: the radiance that reaches each of the G-buffer's ``reflector_pixels`` by way of the mirror, before
-        the reflector's own reflectance. Called only if there are any, unless that skip is off."""
+        the reflector's own reflectance. Called only if there are such pixels, or if ``skip`` does not name
+        ``reflection``."""
 
 
 class RayMethod(Method):

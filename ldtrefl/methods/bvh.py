@@ -5,7 +5,8 @@ the environment on a miss.
 
     ldtrefl render scene.toml --method bvh
 
-Fails: nowhere that the scene's triangles can tell; its cost grows with them, and a mesh that moves needs a new tree.
+Fails: nowhere, as far as the scene's triangles go. Its cost grows with their number, and a mesh whose vertices change
+needs a new tree.
 """
 
 from __future__ import annotations

@@ -37,14 +37,15 @@ from ldtrefl.world.device_object import DeviceObject
 from ldtrefl.world.device_scene import DeviceScene
 
 PIXEL_BYTES = 12
-"""Of a cube map."""
+"""Bytes of a pixel of a cube map."""
 
 LEAST_DEPTH = wp.constant(0.5)
-"""Of a unit vector along the axis of the face that it points to: it is 0.577 or more, and what the eye touches has no
-direction at all."""
+"""The least component that a direction is taken to have along the axis of its face. A unit vector has 0.577 or more;
+the direction to what the eye touches is 0."""
 
 LEAST_SIZE = 1e-6
-"""Of a reflector's distance from the world's origin, how far from its centre a cube map's camera looks at least."""
+"""A cube map's camera looks at a point at least this far from the reflector's centre, as a share of the centre's
+largest coordinate: a nearer point would be rounded to the centre."""
 
 
 @wp.func
@@ -119,11 +120,11 @@ class EnvironmentMap(RayMethod):
     def __init__(self, scene: DeviceScene, config: CommonConfig, tracer: SceneTracer) -> None:
         super().__init__(scene, config, tracer)
         self._cubes: dict[int, wp.array] = {}
-        """By number of the reflector."""
+        """The cube maps, by number of the reflector."""
         self._up: tuple[float, ...] = ()
-        """Where the top of the environment was when they were drawn."""
+        """The direction of the environment's top when they were drawn."""
         self._cubes_taken = 0
-        """Cube maps that memory has been asked for."""
+        """The number of cube maps that memory has been asked for."""
 
     def place(self, scene: DeviceScene) -> None:
         """Go on with a scene in which some objects have moved: every cube map may show them."""

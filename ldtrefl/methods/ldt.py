@@ -6,8 +6,8 @@ regions on the reflectors are culled (section 3.2); the remaining pixels' rays a
 
     ldtrefl render scene.toml --method ldt --set resolution=256
 
-The default search is our own (``tree.py``): it goes down a tree over the triangles, or over the texels where many
-triangles share one. ``search=linear`` is the paper's.
+The default search is our own (``ldt/exact/tree.py``): it goes down a tree over the triangles, or over the texels where
+many triangles share one. ``search=linear`` is the paper's.
 
 Fails: ``search=linear`` misses what is thinner than a step or a texel, and its silhouettes are as coarse as texels;
 ``quality=fast`` loses a little at silhouettes.
@@ -52,7 +52,8 @@ from ldtrefl.world.device_mesh import DeviceMesh
 from ldtrefl.world.device_scene import DeviceScene
 
 FEW_OBJECTS = 8
-"""Objects up to which culling takes as long as it saves: 4% more than without with two to five, 11% less with fifty."""
+"""Up to this many objects culling costs as much as it saves: 4% more time than without it
+with two to five objects, 11% less with fifty."""
 
 
 class Ldt(RayMethod):
@@ -87,9 +88,9 @@ class Ldt(RayMethod):
     def __init__(self, scene: DeviceScene, config: CommonConfig, tracer: SceneTracer) -> None:
         super().__init__(scene, config, tracer)
         self._foreseen: tuple[GBuffer, Mapping[DeviceMesh, int]] | None = None
-        """What was chosen for a frame when its shadows were asked for."""
+        """A frame's G-buffer and the resolutions chosen for it, if shadows were asked for before reflections."""
         self._has_moved = False
-        """Whether any object has: what culling found then tells which rays are the same."""
+        """Whether any object has moved. Culling then pays: it tells which rays of the last frame serve again."""
 
     @classmethod
     def scene_tracer(cls, config: CommonConfig) -> SceneTracer:
@@ -148,9 +149,10 @@ class Ldt(RayMethod):
     def _followed_again(
         self, follower: RayFollower, rays: RayBuffer, regions: Regions, reusable: Reusable | None
     ) -> FollowedRays | None:
-        """The rays, all but those that may end elsewhere taken from the last frame; None if it does not serve.
+        """Where the rays end, taken from the last frame but for rays that may end elsewhere; None if it cannot be used.
 
-        A ray that is the same as then, and could not meet a mesh then, cannot now: only maps of both frames matter.
+        A ray that has not changed meets no mesh that it could not meet then. So only the maps of meshes that are in
+        both frames must be the same.
         """
         if reusable is None or reusable.reflected.followed is None or follower.max_bounces > 1:
             return None
@@ -175,7 +177,7 @@ class Ldt(RayMethod):
         return resolutions_for(self.config.error, self.config.search, self.scene, footprints)
 
     def _first_resolutions(self, gbuffer: GBuffer, rays: RayBuffer, regions: Regions) -> Mapping[DeviceMesh, int]:
-        """What was foreseen for this frame, or else what its first rays need."""
+        """The resolutions that were chosen for this frame's shadows, or else those that its first rays need."""
         foreseen, self._foreseen = self._foreseen, None
         if foreseen is not None and foreseen[0] is gbuffer:
             return foreseen[1]
@@ -189,8 +191,8 @@ class Ldt(RayMethod):
         return flat_regions(gbuffer, rays, stats) if is_flat else safe_regions(gbuffer, rays, bounce, stats)
 
     def _culling_pays(self) -> bool:
-        """Not where all maps that can be needed are made, and few objects stand still: each ray tests their spheres
-        as fast as a run of rays does."""
+        """Whether culling saves more than it costs. It does not where all maps that can be needed are made and a few
+        objects stand still: to test each ray against their spheres is then as fast as to test runs of rays."""
         if len(self.scene.objects) > FEW_OBJECTS or self._has_moved or self.config.error is not None:
             return True
         return not self.tracer.has_usual_maps(self.scene, all_objects(self.scene).shown)

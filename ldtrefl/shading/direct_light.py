@@ -1,7 +1,7 @@
 """Direct light: the radiance that a surface emits, and scatters diffusely of what lights send.
 
 Outgoing radiance of a surface: ``emission + albedo * texture * (ambient + sum of lights) + mirror * reflected``. The
-last term is not found here.
+last term is added elsewhere (``frame/composite.py``).
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ from ldtrefl.shading.surface import Surface
 from ldtrefl.world.records import LightingRecord, ObjectRecord
 
 SMALLEST_SQUARE = wp.constant(1.0e-36)
-"""Squared distance of a light that float32 can divide by: a light in the surface itself divides by no 0."""
+"""The least squared distance that a point light's intensity is divided by: in the surface itself that would be 0."""
 
 LARGEST_RADIANCE = wp.constant(1.0e30)
-"""What is brighter is shown as this: sums and products of such stay finite, and no pixel becomes infinite times 0."""
+"""Brighter radiance is cut to this: its sums and products stay finite, and no pixel becomes infinity times 0."""
 
 
 @wp.func
 def at_most_largest(radiance: wp.vec3) -> wp.vec3:
-    """A radiance that can be added and multiplied."""
+    """Radiance, cut to ``LARGEST_RADIANCE``."""
     return wp.min(radiance, wp.vec3(LARGEST_RADIANCE))
 
 

@@ -9,7 +9,8 @@ from ldtrefl.shading.textures import decoded_color
 from ldtrefl.world.records import LightingRecord
 
 NEAR_X = wp.constant(0.9)
-"""Component of ``up`` along x from which longitude 0 is taken from y: an axis near ``up`` would tell no direction."""
+"""Where ``up`` has a larger component along x than this, longitude 0 is at +y rather than +x: an axis near ``up`` tells
+no direction across it."""
 
 
 @wp.func

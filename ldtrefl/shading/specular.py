@@ -14,5 +14,5 @@ def schlick(reflectance: wp.vec3, cosine: float) -> wp.vec3:
 
 @wp.func
 def mirror_direction(direction: wp.vec3, normal: wp.vec3) -> wp.vec3:
-    """The direction reflected about the normal's plane (either side of it gives the same)."""
+    """A direction mirrored in the plane that a normal stands on; the normal may point to either side."""
     return wp.normalize(direction - 2.0 * wp.dot(direction, normal) * normal)

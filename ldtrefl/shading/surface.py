@@ -14,10 +14,10 @@ from ldtrefl.shading.textures import sample_texture
 from ldtrefl.world.records import ObjectRecord
 
 SMALLEST_NORMAL = wp.constant(1.0e-12)
-"""Squared length below which a vertex normal says nothing and the facet's is taken."""
+"""Squared length of an interpolated normal below which the facet's normal is taken."""
 
 SMALLEST_SINE = wp.constant(1.0e-6)
-"""Squared sine of a triangle's corner below which nothing is extended beyond it."""
+"""Squared sine of a triangle's corner below which barycentrics are not extended beyond the triangle."""
 
 FARTHEST_TURN = wp.constant(0.1)
 """Radians that a normal may turn beyond the triangle that it is known on. A smooth surface bends less over a patch."""
@@ -39,11 +39,12 @@ class Surface:
 
 @wp.func
 def extended_coordinates(record: ObjectRecord, triangle: int, point: wp.vec3d) -> wp.vec2:
-    """Barycentrics of a point about a triangle that stands for its neighbours, too: outside it they go on linearly.
+    """Barycentrics of a point near a triangle, extended linearly beyond its edges.
 
-    So shading is smooth over a patch of many triangles, though only one of them is known. Where normals are
-    interpolated they go on until the normal has turned by ``FARTHEST_TURN``: the normals of a noisy mesh say nothing of
-    their neighbours'. ``point`` is in device space.
+    The triangle of a patch stands for its neighbours, too: only this one is known. With extended barycentrics shading
+    is smooth over the whole patch. Where normals are interpolated, barycentrics are extended only until the normal has
+    turned by ``FARTHEST_TURN``: on a noisy mesh a triangle's normals say nothing about its neighbours'. ``point`` is in
+    device space.
     """
     corners = record.faces[triangle]
     a, b, c = record.vertices[corners[0]], record.vertices[corners[1]], record.vertices[corners[2]]

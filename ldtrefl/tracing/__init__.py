@@ -1,4 +1,4 @@
-"""Rays and where they end: what a tracer is, batches of rays, and the ray caster over a BVH, which is the truth.
+"""Rays and where they end: what a tracer is, batches of rays, and the ray caster over a BVH, the ground truth.
 
 Imports ``world`` and what is below it. Start with ``tracer.py``, the contract.
 """

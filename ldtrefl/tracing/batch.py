@@ -24,7 +24,7 @@ RayArray = ArrayLike | wp.array
 
 @dataclass(frozen=True)
 class Hits:
-    """Answers to a batch of rays of shape (..., 3): numpy arrays, or Warp arrays if the rays were."""
+    """Answers to a batch of rays of shape (..., 3): numpy arrays, or Warp arrays if the rays were given as such."""
 
     t: np.ndarray | wp.array
     """(...) float32, in lengths of each ray's direction; +inf on a miss."""
@@ -39,7 +39,7 @@ class Hits:
 
 
 FILES = ("device/vectors.h", "tracing/ray_batch.h")
-"""What native functions here are made of."""
+"""The headers that the native functions of this file include."""
 
 START = """
     static_assert(sizeof(queries.data[0]) == sizeof(RayBatch::Query), "a Query as it is here");
@@ -70,8 +70,8 @@ def start_queries(
     queries: wp.array(dtype=Query),
     scales: wp.array(dtype=float),
 ) -> wp.int32:
-    """Rays from ``begin`` on in unit space, and how much longer their directions have become there; the number of
-    those that are not finite or have no direction, which search for nothing."""
+    """Bring ``count`` rays from number ``begin`` on into unit space, and write how much longer their directions are
+    there. Returns how many of them are not finite or have no direction; those meet nothing."""
     ...
 
 
@@ -101,14 +101,17 @@ def write_hits(
     triangle: wp.array(dtype=int),
     barycentrics: wp.array(dtype=wp.vec2),
 ):
-    """What the rays from ``begin`` on meet, as users get it."""
+    """Write what the rays from number ``begin`` on meet, in the form in which users get it."""
     ...
 
 
 @launch.once
 def batch_kernel(tracer: Tracer, block: int, only_whether: bool = False) -> wp.Kernel:
-    """The kernel that traces rays given in object space, ``block`` of them an item; or that finds ``only_whether`` they
-    meet anything, by the number of the triangle, which may be any then."""
+    """The kernel that traces rays given in object space; one item of it traces ``block`` rays.
+
+    With ``only_whether`` it finds no more than whether each ray meets anything. The triangle's number tells that: it is
+    -1 on a miss, and may be any triangle's on a hit.
+    """
     find_hits = tracer.any_hits if only_whether else tracer.closest_hits
     size = wp.constant(block)
 
@@ -133,12 +136,12 @@ def batch_kernel(tracer: Tracer, block: int, only_whether: bool = False) -> wp.K
         item = first + wp.tid()
         begin = size * item
         count = wp.min(size, origins.shape[0] - begin)
-        query_room, hit_room = wp.zeros(shape=size, dtype=Query), wp.zeros(shape=size, dtype=Hit)
-        scale_room = wp.zeros(shape=size, dtype=wp.float32)
-        # Arrays over them, which are handed on as they are: rooms would be copied.
-        queries = wp.array(ptr=query_room.ptr, shape=(size,), dtype=Query)
-        hits = wp.array(ptr=hit_room.ptr, shape=(size,), dtype=Hit)
-        scales = wp.array(ptr=scale_room.ptr, shape=(size,), dtype=wp.float32)
+        query_memory, hit_memory = wp.zeros(shape=size, dtype=Query), wp.zeros(shape=size, dtype=Hit)
+        scale_memory = wp.zeros(shape=size, dtype=wp.float32)
+        # Arrays over that memory: functions are handed arrays by reference, but copies of what ``wp.zeros`` gives.
+        queries = wp.array(ptr=query_memory.ptr, shape=(size,), dtype=Query)
+        hits = wp.array(ptr=hit_memory.ptr, shape=(size,), dtype=Hit)
+        scales = wp.array(ptr=scale_memory.ptr, shape=(size,), dtype=wp.float32)
         invalid = start_queries(origins, directions, t_max, begin, count, centre, per_half, queries, scales)
         find_hits(views, 0, queries, count, hits)
         if t_out.shape[0] > 0:
@@ -164,7 +167,8 @@ def trace_batch(
     Args:
         origins: (..., 3) float32, a numpy or Warp array.
         directions: (..., 3) float32, any length.
-        t_max: hits before this count, in lengths of the direction; a number, or (...), one a ray; ``None``: all.
+        t_max: hits count only before this distance, in lengths of the direction: one number for all rays, or (...),
+            one for each; ``None`` for no limit.
 
     Raises:
         InputError: the arrays' shapes do not fit, or they hold no numbers.
@@ -199,10 +203,10 @@ def occluded_batch(
     directions: RayArray,
     t_max: RayArray | None = None,
 ) -> np.ndarray | wp.array:
-    """Whether rays meet an object at all; arguments and errors as :func:`trace_batch` has them.
+    """Whether rays meet an object at all. Arguments and errors are those of :func:`trace_batch`.
 
     Returns:
-        (...) bool; for Warp arrays (n,) int32, below 0 where nothing is met.
+        (...) bool; if the rays are Warp arrays, an (n,) int32 Warp array, below 0 where nothing is met.
     """
     device = geometry.vertices.device
     rays = _Rays(origins, directions, t_max, device)
@@ -251,7 +255,8 @@ def _launch_batch(
     *,
     only_whether: bool = False,
 ) -> int:
-    """Trace rays; the number of those that are invalid. The ``unit_frame`` is (0, 1) if they are in unit space."""
+    """Trace rays, and return how many of them are invalid. ``unit_frame`` is the centre of the object's bounding box
+    and half its longest side; (0, 1) for rays that are in unit space."""
     device, (centre, half) = rays.origins.device, unit_frame
     block = block_of(device)
     items = -(-rays.count // block)
@@ -262,7 +267,7 @@ def _launch_batch(
 
 
 def _limits(t_max: RayArray | None, shape: tuple[int, ...], device: wp.Device) -> wp.array:
-    """(n,), (1,) or, where there are none, (0,) float32."""
+    """``t_max`` on the device, float32: (n,) with one limit a ray, (1,) with one for all, (0,) without any."""
     if t_max is None:
         return wp.empty(0, dtype=float, device=device)
     if isinstance(t_max, wp.array):

@@ -32,7 +32,7 @@ class BvhView:
 
 @wp.func
 def closest_hit_in_bulk(views: wp.array(dtype=BvhView), index: int, query: Query) -> Hit:
-    """What a ray meets first, outliers left out."""
+    """The first triangle that a ray meets, outliers left out."""
     hit = no_hit()
     if query.t_max > 0.0:
         passed = distance_passed(query.origin, query.direction, SPHERE)
@@ -60,7 +60,7 @@ def closest_hits_bvh(
 
 @wp.func
 def occluded_bvh(views: wp.array(dtype=BvhView), index: int, query: Query, outwards: wp.vec3) -> bool:
-    """The tracer's ``occluded``: a ray that leaves the mesh starts above its own triangle, and needs nothing else."""
+    """The tracer's ``occluded``. It does not need ``outwards``: rays start above the triangle that they leave."""
     if is_outlier_met(views[index].outliers, query):
         return True
     if not query.t_max > 0.0:
@@ -109,7 +109,7 @@ class Raycaster:
         self.geometry = geometry
         faces = geometry.faces
         if len(geometry.mesh.outliers):
-            # A point is never met; the others keep their numbers.
+            # An outlier is made a triangle without area, which no ray meets, so that the others keep their numbers.
             rest = geometry.mesh.faces.copy()
             rest[geometry.mesh.outliers] = rest[np.delete(np.arange(len(rest)), geometry.mesh.outliers)[0], :1]
             faces = wp.array(rest, dtype=wp.vec3i, device=faces.device)
@@ -127,7 +127,8 @@ class Raycaster:
         Args:
             origins: (..., 3) float32 numpy or Warp array.
             directions: (..., 3) float32, any length; ``t`` is in lengths of it.
-            t_max: hits before this count; a number, or (...), one a ray; ``None``: all.
+            t_max: hits count only before this distance: one number for all rays, or (...), one for each; ``None`` for
+                no limit.
 
         Raises:
             InputError: the arrays' shapes do not fit, or they hold no numbers.
@@ -135,7 +136,7 @@ class Raycaster:
         return trace_batch(BVH, self._views(), self.geometry, origins, directions, t_max)
 
     def occluded(self, origins: RayArray, directions: RayArray, t_max: RayArray | None = None) -> np.ndarray | wp.array:
-        """(...) bool: whether rays meet the mesh at all; arguments and errors as :meth:`trace` has them."""
+        """(...) bool: whether rays meet the mesh at all. Arguments and errors are those of :meth:`trace`."""
         return occluded_batch(BVH, self._views(), self.geometry, origins, directions, t_max)
 
     def _views(self) -> wp.array:

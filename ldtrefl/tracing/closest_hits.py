@@ -15,7 +15,8 @@ from ldtrefl.world.records import ObjectRecord
 from ldtrefl.world.unit_rays import into_unit
 
 BEYOND = wp.constant(1.000001)
-"""Of the distance that was met, how far another object is searched: what lies in the same place must be found too."""
+"""Factor on a ray's nearest distance so far, up to which the next object is searched: a hit in the same place must be
+found, too, whatever way it is rounded."""
 
 
 @wp.func
@@ -59,7 +60,7 @@ def may_meet(record: ObjectRecord, origin: wp.vec3d, direction: wp.vec3, t_max: 
 
 
 @wp.struct
-class Asked:
+class SearchedRay:
     """A ray that is searched for in an object."""
 
     ray: int  # its number
@@ -68,25 +69,34 @@ class Asked:
 
 @wp.func
 def keep_found(
-    record: ObjectRecord, rays: RayBuffer, asked: Asked, k: int, found: Hit, in_sphere_only: bool, hits: HitBuffer
+    record: ObjectRecord,
+    rays: RayBuffer,
+    searched: SearchedRay,
+    k: int,
+    found: Hit,
+    in_sphere_only: bool,
+    hits: HitBuffer,
 ):
     """Count a search in object ``k``, and keep what it found if that is nearer than what the ray has met so far. With
     ``in_sphere_only`` a hit counts only if the ray meets the bounding sphere."""
-    i = asked.ray
+    i = searched.ray
     hits.steps[i] = hits.steps[i] + found.steps
     hits.searches[i] = hits.searches[i] + 1
     is_met = found.triangle >= 0
     if in_sphere_only and is_met:
-        # Coarse patches may rise out of the sphere, where a search by bounds does not look.
+        # Patches of coarse maps may stick out of the bounding sphere, where a search by bounds does not look.
         is_met = may_meet(record, rays.origin[i], rays.direction[i], wp.inf)
     if is_met:
-        keep_nearer(hits, i, k, found.t / asked.stretch, found)
+        keep_nearer(hits, i, k, found.t / searched.stretch, found)
 
 
 @launch.once
 def closest_hits_kernel(tracer: Tracer, block: int, bounds: bool = True) -> wp.Kernel:
-    """The kernel that finds where rays end, ``block`` of them an item. With ``bounds`` an object is searched only for
-    the rays that enter its bounding sphere before they have met another; of 32 the first to be entered comes first."""
+    """The kernel that finds where rays end; one item of it follows ``block`` rays.
+
+    With ``bounds`` an object is searched only for the rays that enter its bounding sphere before their nearest hit so
+    far. Of each 32 objects the one that is entered first is then searched first.
+    """
     find_hits, size, to_infinity = tracer.closest_hits, wp.constant(block), wp.constant(not bounds)
 
     @launch.kernel
@@ -103,10 +113,10 @@ def closest_hits_kernel(tracer: Tracer, block: int, bounds: bool = True) -> wp.K
         """Find the closest hits of one block of rays, object by object."""
         begin = size * (first + wp.tid())
         end = wp.min(begin + size, rays.source.shape[0])
-        query_room, hit_room = wp.zeros(shape=size, dtype=Query), wp.zeros(shape=size, dtype=Hit)
-        queries = wp.array(ptr=query_room.ptr, shape=(size,), dtype=Query)
-        found = wp.array(ptr=hit_room.ptr, shape=(size,), dtype=Hit)
-        asked = wp.zeros(shape=size, dtype=Asked)
+        query_memory, hit_memory = wp.zeros(shape=size, dtype=Query), wp.zeros(shape=size, dtype=Hit)
+        queries = wp.array(ptr=query_memory.ptr, shape=(size,), dtype=Query)
+        found = wp.array(ptr=hit_memory.ptr, shape=(size,), dtype=Hit)
+        searched = wp.zeros(shape=size, dtype=SearchedRay)
         lead = int(-1)  # the first ray that is alive: objects are searched in the order in which it enters them
         for i in range(begin, end):
             set_miss(hits, i)
@@ -122,7 +132,7 @@ def closest_hits_kernel(tracer: Tracer, block: int, bounds: bool = True) -> wp.K
                 k = first_entered(objects, left, word, rays.origin[lead], rays.direction[lead])
                 left = without(left, k)
 
-                # Ask for the rays that may meet it.
+                # Search for the rays that may meet it.
                 count = int(0)
                 for i in range(begin, end):
                     source = rays.source[i]
@@ -133,12 +143,12 @@ def closest_hits_kernel(tracer: Tracer, block: int, bounds: bool = True) -> wp.K
                             queries[count].direction = ray.way
                             # t stays in device units: divide by the direction's length in unit space.
                             queries[count].t_max = wp.where(to_infinity, wp.inf, BEYOND * hits.t[i] * ray.stretch)
-                            asked[count].ray = i
-                            asked[count].stretch = ray.stretch
+                            searched[count].ray = i
+                            searched[count].stretch = ray.stretch
                             count += 1
                 if count > 0:
                     find_hits(views, k, queries, count, found)
                 for j in range(count):
-                    keep_found(objects[k], rays, asked[j], k, found[j], to_infinity, hits)
+                    keep_found(objects[k], rays, searched[j], k, found[j], to_infinity, hits)
 
     return closest_hits

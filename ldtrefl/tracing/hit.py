@@ -11,7 +11,7 @@ class Hit:
 
     t: float
     triangle: int
-    u: float  # barycentrics: weights of the triangle's second and third corner; -1 if the triangle is one of many there
+    u: float  # barycentrics: weights of the triangle's second and third corner; -1 if it stands for many
     v: float
     normal: wp.vec3  # of the facet, unit, by the triangle's winding
     steps: int  # texels or samples looked at

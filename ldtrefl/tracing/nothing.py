@@ -10,7 +10,7 @@ from ldtrefl.tracing.tracer import BoundTracer, Query, Tracer
 
 @wp.struct
 class NoView:
-    """The view of a tracer that sees nothing."""
+    """The view of a tracer that meets nothing."""
 
     unused: int
 
@@ -19,13 +19,13 @@ class NoView:
 def never_hits(
     views: wp.array(dtype=NoView), index: int, queries: wp.array(dtype=Query), count: int, hits: wp.array(dtype=Hit)
 ):
-    """``closest_hits`` and ``any_hits`` of a tracer that sees nothing: they stay misses."""
+    """``closest_hits`` and ``any_hits`` of a tracer that meets nothing: all rays stay misses."""
     return
 
 
 @wp.func
 def never_occluded(views: wp.array(dtype=NoView), index: int, query: Query, outwards: wp.vec3) -> bool:
-    """``occluded`` of a tracer that sees nothing."""
+    """``occluded`` of a tracer that meets nothing."""
     return False
 
 
@@ -33,5 +33,5 @@ NOTHING = Tracer("nothing", NoView, never_hits, never_hits, never_occluded)
 
 
 def no_shadows(device: wp.Device) -> BoundTracer:
-    """``NOTHING``, bound."""
+    """The tracer ``NOTHING``, ready for kernels."""
     return BoundTracer(NOTHING, wp.empty(0, dtype=NoView, device=device))

@@ -26,7 +26,7 @@ LOWEST_BIT = """
 
 @wp.func_native(LOWEST_BIT)
 def lowest_bit(word: wp.uint32) -> wp.int32:
-    """The number of the lowest bit that is set; of none, undefined."""
+    """The number of the lowest bit that is set; undefined if none is."""
     ...
 
 
@@ -64,7 +64,7 @@ def has_bit(bits: wp.uint32, k: int) -> bool:
 
 
 def word_count(objects: int) -> int:
-    """Words of a row of bits."""
+    """32-bit words in a row of bits for so many objects."""
     return -(-objects // 32)
 
 
@@ -83,7 +83,7 @@ def objects_in(table: np.ndarray, objects: int) -> set[int]:
 
 
 def sets_of_runs(bits: wp.array) -> ObjectSets:
-    """A row of bits a run. Without any row every ray can meet all objects."""
+    """Sets that have a row of bits for each run. Without any rows every ray can meet all objects."""
     sets = ObjectSets()
     sets.bits = bits
     sets.rows = wp.empty(0, dtype=wp.int32, device=bits.device)
@@ -91,11 +91,11 @@ def sets_of_runs(bits: wp.array) -> ObjectSets:
 
 
 def run_count(rays: int) -> int:
-    """Runs that hold so many rays."""
+    """The number of runs that so many rays make."""
     return -(-rays // int(RUN))
 
 
 def rays_of(runs: np.ndarray, rays: int) -> np.ndarray:
-    """Numbers of the rays in these runs, of so many rays in all."""
+    """Numbers of the rays in these runs; ``rays`` is how many rays there are in all."""
     numbers = (runs[:, None] * int(RUN) + np.arange(int(RUN))).ravel()
     return numbers[numbers < rays]

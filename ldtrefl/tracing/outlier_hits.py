@@ -11,7 +11,7 @@ from ldtrefl.tracing.tracer import Query
 from ldtrefl.world.outliers import BOX_MARGIN, Outliers, OutlierTriangle
 
 NEGLIGIBLE = 1.0e-30
-"""Component of a direction below which the ray runs along the planes."""
+"""A component of a direction that is smaller than this is taken for this: the ray runs along the sides of boxes."""
 
 ENTERED = """
     typedef Vectors V;
@@ -29,7 +29,7 @@ ENTERED = """
         in = V::greater(V::lesser(a, b), in);
         out = V::lesser(V::greater(a, b), out);
     }
-    // Rounding of the products, which may be far from 0.
+    // The margin covers the rounding of the products, which grows with them.
     return V::bits(in <= out + V::eight(BOX_MARGIN) * V::greater(in, V::greater(out, -out)));
 """
 
@@ -68,7 +68,7 @@ def outlier_hit(outlier: OutlierTriangle, origin: wp.vec3d, direction: wp.vec3, 
 
 @wp.func
 def first_outlier_hit(outliers: Outliers, origin: wp.vec3d, direction: wp.vec3, t_max: float) -> Hit:
-    """What a ray meets first of them, from ``origin`` in unit space."""
+    """The outlier that a ray in unit space meets first."""
     hit = no_hit()
     for group in range((outliers.triangles.shape[0] + 7) / 8):
         entered = boxes_entered(outliers.boxes, group, origin, direction, t_max)
@@ -86,7 +86,7 @@ def first_outlier_hit(outliers: Outliers, origin: wp.vec3d, direction: wp.vec3, 
 
 @wp.func
 def merge_outliers(outliers: Outliers, queries: wp.array(dtype=Query), count: int, hits: wp.array(dtype=Hit)):
-    """Let what rays meet far outside the bulk count, too, where it is nearer than what they have met there."""
+    """Test rays against the outliers, and replace the hits in the bulk that lie behind one."""
     if outliers.triangles.shape[0] > 0:
         for i in range(count):
             t_max = queries[i].t_max
@@ -100,7 +100,7 @@ def merge_outliers(outliers: Outliers, queries: wp.array(dtype=Query), count: in
 
 @wp.func
 def add_outliers_met(outliers: Outliers, queries: wp.array(dtype=Query), count: int, hits: wp.array(dtype=Hit)):
-    """Of rays that meet nothing else, find whether they meet something far outside the bulk."""
+    """Find whether the rays that have met nothing in the bulk meet an outlier."""
     if outliers.triangles.shape[0] > 0:
         for i in range(count):
             if hits[i].triangle < 0:
@@ -110,7 +110,7 @@ def add_outliers_met(outliers: Outliers, queries: wp.array(dtype=Query), count: 
 
 @wp.func
 def is_outlier_met(outliers: Outliers, query: Query) -> bool:
-    """Whether a ray meets something far outside the bulk."""
+    """Whether a ray meets an outlier."""
     if outliers.triangles.shape[0] == 0:
         return False
     return first_outlier_hit(outliers, query.origin, query.direction, query.t_max).triangle >= 0

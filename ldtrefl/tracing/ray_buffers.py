@@ -43,7 +43,7 @@ class HitBuffer:
 
 @wp.func
 def set_miss(hits: HitBuffer, i: int):
-    """Let ray ``i`` have met nothing so far."""
+    """Set ray ``i`` to a miss."""
     hits.t[i] = wp.inf
     hits.object[i] = -1
     hits.triangle[i] = -1
@@ -86,7 +86,7 @@ def copy_ray(rays: RayBuffer, i: int, rays_out: RayBuffer, k: int):
 
 
 def empty_rays(count: int, device: wp.Device) -> RayBuffer:
-    """Room for so many rays."""
+    """A buffer for so many rays, not filled yet."""
     rays = RayBuffer()
     rays.pixel, rays.source, rays.source_triangle = (wp.empty(count, dtype=wp.int32, device=device) for _ in range(3))
     rays.origin = wp.empty(count, dtype=wp.vec3d, device=device)
@@ -95,7 +95,7 @@ def empty_rays(count: int, device: wp.Device) -> RayBuffer:
 
 
 def empty_hits(count: int, device: wp.Device) -> HitBuffer:
-    """Room for the ends of so many rays."""
+    """A buffer for the ends of so many rays, not filled yet."""
     hits = HitBuffer()
     hits.t = wp.empty(count, dtype=float, device=device)
     hits.object, hits.triangle, hits.steps, hits.searches = (
@@ -131,7 +131,7 @@ def _arrays_of(kind: type) -> list[str]:
 def distance_across(
     origin: np.ndarray, direction: np.ndarray, other_origin: np.ndarray, other_direction: np.ndarray, t: np.ndarray
 ) -> np.ndarray:
-    """(n,) how far apart pairs of rays are at ``t``, (n,), across the first's direction; vectors are (n, 3)."""
+    """(n,) distance between two rays at ``t``, (n,), measured across the first's direction; vectors are (n, 3)."""
     gap = other_origin - origin + t[:, None] * (other_direction - direction)
     gap -= (gap * direction).sum(axis=1, keepdims=True) * direction
     return np.linalg.norm(gap, axis=1)

@@ -1,4 +1,7 @@
-"""The BVHs of a scene, one a mesh: the tracer of ray casting, and of the shadows of every method without its own."""
+"""The BVHs of a scene, one for each mesh.
+
+They answer the rays of ray casting, and the shadow rays of every method that has no tracer of its own.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +18,7 @@ class SceneBvh:
     def __init__(self) -> None:
         self._bound: BoundTracer | None = None
         self._owners: dict[DeviceMesh, Raycaster] = {}
-        """What the views point to."""
+        """They own the trees that the views point to."""
 
     def bound(self, scene: DeviceScene, objects: set[int], stats: Stats) -> BoundTracer:
         """The tracer over all objects, of this scene and of all that come from it by moves."""

@@ -57,7 +57,10 @@ class BoundTracer:
 
 
 class SceneTracer(Protocol):
-    """A tracer for all objects of a scene: makes what it needs of a mesh when that is first needed, and keeps it."""
+    """A tracer for all objects of a scene: makes what it needs of a mesh when that is first needed, and keeps it.
+
+    It owns what its views point to, so it must live as long as a ``BoundTracer`` of it is used.
+    """
 
     def bound(self, scene: DeviceScene, objects: set[int], stats: Stats) -> BoundTracer:
         """The tracer, ready for rays that can meet these objects, given by their numbers."""
