@@ -17,8 +17,9 @@ from ldtrefl.world.device_scene import DeviceScene
 TEXEL = {"exact": 0.25, "linear": 0.75}
 """Side of a texel, in footprints, for an error of one pixel, by search.
 
-Measured on the paper's scenes, sideways to the ray, at the 99th percentile: patches that stand for rough surfaces are off by up to five texels where a ray grazes a ridge;
-the paper's search is off by 0.2 to 1 texel at half a pixel's texels."""
+Measured on the paper's scenes, sideways to the ray, at the 99th percentile: patches that stand for rough surfaces are
+off by up to five texels where a ray grazes a ridge; the paper's search is off by 0.2 to 1 texel at half a pixel's
+texels."""
 
 
 def resolutions_for(
