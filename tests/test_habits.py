@@ -1,4 +1,4 @@
-"""How code reads here, as far as a program can tell: sizes of files and functions, docstrings, types, places of tests."""
+"""How code reads here, as far as a program can tell: sizes, docstrings, types, and where tests stand."""
 
 import ast
 import functools
