@@ -205,7 +205,7 @@ class Renderer:
         return FrameParts(gbuffer, shaded, reflected, tuple(stats.seconds))
 
     def _shadow_tracer(self, gbuffer: GBuffer, stats: Stats) -> BoundTracer:
-        """What answers shadow rays from what the camera sees."""
+        """The tracer that answers the shadow rays of what the camera sees."""
         scene = gbuffer.scene
         if not scene.lighting.shadows:
             return no_shadows(scene.device)

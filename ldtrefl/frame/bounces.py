@@ -123,7 +123,7 @@ def summed_by_pixel(pixels: wp.array, rays: RayBuffer, radiance: wp.array) -> wp
 
 
 class Guide(Protocol):
-    """What a method decides for the rays of a bounce."""
+    """A method's part in a bounce: which objects rays can meet, and the tracer that answers them."""
 
     def regions(self, gbuffer: GBuffer, rays: RayBuffer, bounce: int, stats: Stats) -> Regions:
         """Which objects the rays of a bounce can meet; bounce 0 is the first."""
@@ -141,7 +141,7 @@ class FollowedRays:
     sets: ObjectSets
     """The objects that each could meet."""
     hits: HitBuffer
-    """Where each ended at its first bounce."""
+    """Where each ended after its first reflection."""
     radiance: wp.array
     """(n,) vec3 that each brings, by all of its bounces."""
 

@@ -27,7 +27,7 @@ class FirstHits:
 
     @classmethod
     def of(cls, gbuffer: GBuffer, followed: FollowedRays) -> FirstHits:
-        """Where rays end that were followed from a G-buffer."""
+        """The first hits of rays that were followed from a G-buffer."""
         return cls(gbuffer.shape, followed.rays, followed.hits, gbuffer.scene.device_units_per_world_unit)
 
     @functools.cached_property

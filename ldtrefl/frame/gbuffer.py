@@ -81,7 +81,7 @@ def exact_corner(record: ObjectRecord, vertex: int) -> wp.vec3d:
 
 @wp.func
 def point_on_ray(record: ObjectRecord, triangle: int, eye: wp.vec3d, ray: wp.vec3, otherwise: wp.vec3d) -> wp.vec3d:
-    """Where a ray from the eye meets the plane of a triangle, in float64; ``otherwise`` where it does not."""
+    """Where a ray from the eye meets the plane of a triangle, in float64; ``otherwise`` if it runs along the plane."""
     corners = record.faces[triangle]
     a = exact_corner(record, corners[0])
     normal = wp.cross(exact_corner(record, corners[1]) - a, exact_corner(record, corners[2]) - a)
@@ -132,7 +132,7 @@ class GBuffer:
     scene: DeviceScene
     camera: Camera
     view: GBufferView
-    """Of (height * width) pixels what each sees, and the camera."""
+    """What each of (height * width) pixels sees, and the camera."""
     band: Band
     """The rows; h is their number."""
 

@@ -1,4 +1,4 @@
-"""What a frame may use again of the frames before it: the one owner of all that is kept from frame to frame.
+"""The history of a renderer's frames: the one owner of all that is kept from frame to frame.
 
 Whether the camera is the same, and which objects have moved, is decided here and nowhere else. While the camera stays,
 what stands still is drawn once and what moves is drawn over it; reflected rays that nothing has changed for are taken
@@ -64,7 +64,7 @@ class Reusable:
 
 
 class FrameHistory:
-    """What is kept of the frames of one renderer."""
+    """What is kept from frame to frame of one renderer."""
 
     def __init__(self, *, keeps: bool) -> None:
         """Keep nothing between frames unless ``keeps``."""
@@ -93,14 +93,14 @@ class FrameHistory:
         return self._parts if moved is not None and not moved else None
 
     def reusable(self, scene: DeviceScene, camera: Camera) -> Reusable | None:
-        """What a method may use again; None if the camera is another one, or all objects have moved."""
+        """What a method may use again; None if the camera is another one, or nothing was kept."""
         moved = self._moved(scene, camera)
         if moved is None or self._reflected is None:
             return None
         return Reusable(self._reflected, moved)
 
     def gbuffer(self, scene: DeviceScene, camera: Camera) -> GBuffer:
-        """What ``camera`` sees of a scene; the rest of the last frame is dropped, so that its memory is used again."""
+        """Draw what ``camera`` sees of a scene. The last frame is dropped first, so that its memory is used again."""
         everything = frozenset(range(len(scene.objects)))
         moved = self._moved(scene, camera)
         self._parts = None

@@ -1,4 +1,4 @@
-"""What a reflection method answers: the radiance that reaches each reflector pixel by way of the mirror."""
+"""The answer of a reflection method: the radiance that reaches each reflector pixel by way of the mirror."""
 
 from __future__ import annotations
 

@@ -90,7 +90,7 @@ class WholeFrame:
 
     @classmethod
     def of(cls, parts: FrameParts) -> WholeFrame:
-        """What a frame needs of its parts: no more, so that the memory of the others is used again."""
+        """Keep what a frame's pictures are made from, and no more: the memory of the other parts is used again."""
         gbuffer, reflected = parts.gbuffer, parts.reflected
         return cls(gbuffer.shape, gbuffer.reflector_pixels, reflected.radiance, gbuffer.view.reflector, reflected.hits)
 

@@ -69,7 +69,7 @@ def resolve_pixels(
 
 
 def resolved(drawing: Drawing, scene: DeviceScene, camera: Camera) -> GBuffer:
-    """What each pixel sees."""
+    """The G-buffer of what was drawn: which point of which triangle each pixel sees."""
     device, pixels = scene.device, camera.width * drawing.band.rows
     view = GBufferView()
     view.object, view.triangle = (wp.empty(pixels, dtype=wp.int32, device=device) for _ in range(2))
@@ -87,14 +87,14 @@ def resolved(drawing: Drawing, scene: DeviceScene, camera: Camera) -> GBuffer:
 
 
 def draw_gbuffer(scene: DeviceScene, camera: Camera) -> GBuffer:
-    """What ``camera`` sees of the scene."""
+    """Draw what ``camera`` sees of the scene."""
     drawing = Drawing.empty(scene, camera)
     drawing.add(scene, camera, range(len(scene.objects)))
     return resolved(drawing, scene, camera)
 
 
 def draw_in_bands(scene: DeviceScene, camera: Camera, *, without: int = -1) -> Iterator[GBuffer]:
-    """What ``camera`` sees of the scene, band by band from the top, object number ``without`` left out."""
+    """Draw what ``camera`` sees of the scene, band by band from the top; object number ``without`` is left out."""
     everything = [number for number in range(len(scene.objects)) if number != without]
     rows = max(1, BAND_PIXELS // camera.width // BLOCK) * BLOCK
     # The corners are the whole image's, and found once.

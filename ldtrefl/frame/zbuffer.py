@@ -110,7 +110,7 @@ class Drawing:
 
     @classmethod
     def empty(cls, scene: DeviceScene, camera: Camera, band: Band | None = None) -> Drawing:
-        """Nothing drawn yet; of the whole image if no band is given."""
+        """An empty z-buffer of a band, or of the whole image."""
         corners = wp.empty(scene.vertex_count, dtype=wp.vec3d, device=scene.device)
         return cls._blank(scene, camera, band or whole_image(camera), corners)
 
@@ -124,7 +124,7 @@ class Drawing:
         return Drawing(wp.clone(self.keys), self.corners, self.band)
 
     def of_band(self, scene: DeviceScene, camera: Camera, band: Band) -> Drawing:
-        """Nothing drawn yet in another band, the corners the same."""
+        """An empty z-buffer of another band, with the same corners."""
         return self._blank(scene, camera, band, self.corners)
 
     def add(self, scene: DeviceScene, camera: Camera, numbers: Iterable[int]) -> None:

@@ -35,7 +35,7 @@ CONFIG = ConfigDict(extra="forbid", use_attribute_docstrings=True)
 
 @pydantic_dataclass(frozen=True, kw_only=True, config=CONFIG)
 class CommonConfig:
-    """What every method's ``Config`` begins with."""
+    """The options that every method has."""
 
     # Described by ``Field``, because the classes that come from this one inherit no attribute docstrings.
     skip: Annotated[
@@ -60,7 +60,7 @@ class Method(abc.ABC):
 
     @classmethod
     def scene_tracer(cls, config: CommonConfig) -> SceneTracer:
-        """What a renderer asks for shadows, and for the rays of methods that have any: the ray caster by default."""
+        """The tracer that answers shadow rays, and the method's own rays if it has any; by default the ray caster."""
         return SceneBvh()
 
     def place(self, scene: DeviceScene) -> None:

@@ -130,7 +130,7 @@ class Ldt(RayMethod):
         return ReflectedLight(radiance, FirstHits.of(gbuffer, followed), followed, chosen)
 
     def regions(self, gbuffer: GBuffer, rays: RayBuffer, bounce: int, stats: Stats) -> Regions:
-        """Which objects the rays of a bounce can meet; and how fine their maps must be."""
+        """Cull the rays of a bounce, and choose how fine the maps must be that they are searched for in."""
         regions = self._culled(gbuffer, rays, bounce, stats)
         if bounce == 0:
             self.tracer.chosen = self._first_resolutions(gbuffer, rays, regions)
@@ -170,7 +170,7 @@ class Ldt(RayMethod):
         return self.config.error is not None and self.config.resolution is None
 
     def _resolutions(self, gbuffer: GBuffer, rays: RayBuffer, regions: Regions) -> Mapping[DeviceMesh, int]:
-        """What the rays of a bounce, and the shadows, need; nothing if all maps have the usual resolution."""
+        """The resolutions that the rays of a bounce and the shadows need; empty if all maps have the usual one."""
         if self.config.error is None or not self._chooses:
             return {}
         footprints = finest_footprints(gbuffer, rays, regions, is_seen=bool(self.scene.lighting.shadows))

@@ -15,7 +15,7 @@ no direction across it."""
 
 @wp.func
 def environment_radiance(lighting: LightingRecord, direction: wp.vec3) -> wp.vec3:
-    """What a ray of this unit direction sees that hits nothing."""
+    """The radiance that a ray of this unit direction sees if it hits nothing."""
     height = wp.dot(direction, lighting.up)
     if lighting.image_size[0] == 0:
         blend = 0.5 + 0.5 * height

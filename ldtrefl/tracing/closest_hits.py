@@ -34,7 +34,7 @@ def bits_without_source(
 def first_entered(
     objects: wp.array(dtype=ObjectRecord), bits: wp.uint32, word: int, origin: wp.vec3d, direction: wp.vec3
 ) -> int:
-    """Of the objects of a word of bits, the one whose bounding sphere a ray enters first; if it enters none, any."""
+    """The object of a word of bits whose bounding sphere a ray enters first; any of them if it enters none."""
     first = 32 * word + lowest_bit(bits)
     rest = without(bits, first)
     if rest == wp.uint32(0):

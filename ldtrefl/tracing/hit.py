@@ -1,4 +1,4 @@
-"""What a ray meets first on an object."""
+"""A hit: the point at which a ray meets an object first."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import warp as wp
 
 @wp.struct
 class Hit:
-    """Where a ray meets an object first."""
+    """The point at which a ray meets an object first."""
 
     t: float
     triangle: int

@@ -1,4 +1,4 @@
-"""What a tracer is: the functions that answer rays, the same three for every way to search.
+"""What a tracer is: the three functions that answer rays, whatever way they search.
 
 A *tracer* answers rays against single objects inside kernels: Warp functions over an array of *views*, one view per
 object, in the object's unit space. Rays come in blocks, so that a tracer may search for them together. Kernels that
