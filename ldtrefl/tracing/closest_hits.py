@@ -92,11 +92,8 @@ def keep_found(
 
 @launch.once
 def closest_hits_kernel(tracer: Tracer, block: int, bounds: bool = True) -> wp.Kernel:
-    """The kernel that finds where rays end; one item of it follows ``block`` rays.
-
-    With ``bounds`` an object is searched only for the rays that enter its bounding sphere before their nearest hit so
-    far. Of each 32 objects the one that is entered first is then searched first.
-    """
+    """The kernel that finds where rays end; one item follows ``block`` rays. With ``bounds`` an object is searched only
+    for rays that enter its bounding sphere before their nearest hit so far; of 32 the first entered comes first."""
     find_hits, size, to_infinity = tracer.closest_hits, wp.constant(block), wp.constant(not bounds)
 
     @launch.kernel
