@@ -42,8 +42,6 @@ class _Bound:
     maps: dict[DeviceMesh, LayeredDepthTexture | None]
     """The maps of each mesh; None where none are needed."""
     tracer: BoundTracer
-    views: list[object]
-    """They own what the tracer points to."""
 
 
 class SceneMaps:
@@ -118,7 +116,7 @@ class SceneMaps:
             for mesh, maps in current.items()
         }
         views = array_of_views([of_mesh[entry.geometry] for entry in scene.objects], tracer.view, scene.device)
-        return _Bound(current, BoundTracer(tracer, views), list(of_mesh.values()))
+        return _Bound(current, BoundTracer(tracer, views, list(of_mesh.values())))
 
 
 def _meshes(scene: DeviceScene) -> dict[DeviceMesh, None]:

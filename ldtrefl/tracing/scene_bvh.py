@@ -8,7 +8,6 @@ from __future__ import annotations
 from ldtrefl.device.stats import Stats
 from ldtrefl.tracing.bvh import BVH, BvhView, Raycaster
 from ldtrefl.tracing.tracer import BoundTracer, array_of_views
-from ldtrefl.world.device_mesh import DeviceMesh
 from ldtrefl.world.device_scene import DeviceScene
 
 
@@ -17,15 +16,13 @@ class SceneBvh:
 
     def __init__(self) -> None:
         self._bound: BoundTracer | None = None
-        self._owners: dict[DeviceMesh, Raycaster] = {}
-        """They own the trees that the views point to."""
 
     def bound(self, scene: DeviceScene, objects: set[int], stats: Stats) -> BoundTracer:
         """The tracer over all objects, of this scene and of all that come from it by moves."""
         if self._bound is None:
             with stats.stage("build", scene.device):
                 meshes = dict.fromkeys(entry.geometry for entry in scene.objects)
-                self._owners = {mesh: Raycaster.of(mesh) for mesh in meshes}
-                views = [self._owners[entry.geometry].view() for entry in scene.objects]
-                self._bound = BoundTracer(BVH, array_of_views(views, BvhView, scene.device))
+                trees = {mesh: Raycaster.of(mesh) for mesh in meshes}
+                views = [trees[entry.geometry].view() for entry in scene.objects]
+                self._bound = BoundTracer(BVH, array_of_views(views, BvhView, scene.device), list(trees.values()))
         return self._bound

@@ -54,13 +54,12 @@ class BoundTracer:
 
     tracer: Tracer
     views: wp.array
+    owners: Sequence[object] = ()
+    """What owns the memory that the views point to."""
 
 
 class SceneTracer(Protocol):
-    """A tracer for all objects of a scene: makes what it needs of a mesh when that is first needed, and keeps it.
-
-    It owns what its views point to, so it must live as long as a ``BoundTracer`` of it is used.
-    """
+    """A tracer for all objects of a scene: makes what it needs of a mesh when that is first needed, and keeps it."""
 
     def bound(self, scene: DeviceScene, objects: set[int], stats: Stats) -> BoundTracer:
         """The tracer, ready for rays that can meet these objects, given by their numbers."""
