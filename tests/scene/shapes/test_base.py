@@ -1,7 +1,6 @@
 """What is true of every shape: every file of the folder that is found is checked here by itself."""
 
 import gc
-import re
 import weakref
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,13 +11,11 @@ import pytest
 import trimesh
 from pydantic import TypeAdapter
 
-import ldtrefl
 from ldtrefl import InputError
 from ldtrefl.base import budget
 from ldtrefl.scene import shapes
 from ldtrefl.scene.shapes import base
 
-ROOT = Path(ldtrefl.__file__).parent.parent
 FINEST_CLOSED = 400_000
 """Triangles of a mesh that is welded here: a second's work."""
 
@@ -64,15 +61,6 @@ def test_a_shape_is_a_file_of_its_name() -> None:
     assert shapes.names() == sorted(shapes.names()) and len(shapes.names()) >= 12
     for name, shape in shapes.all_shapes().items():
         assert (folder / f"{name}.py").is_file() and shape.make.__doc__
-
-
-def test_readme_lists_every_shape() -> None:
-    """And none that there is not: the sentence that begins with "Shapes:", in README or in docs."""
-    texts = [path.read_text() for path in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))]
-    lists = [found for text in texts for found in re.findall(r"Shapes: ([^.]*)\.", text)]
-    assert lists, "no sentence lists the shapes"
-    for found in lists:
-        assert sorted(re.findall(r"`(\w+)`", found)) == shapes.names()
 
 
 @pytest.mark.parametrize("name", shapes.names())
