@@ -7,7 +7,7 @@ fields::
     def mean_difference(image: np.ndarray, reference: np.ndarray, mask: np.ndarray) -> float:
         return float(np.abs(image - reference)[mask].mean())
 
-It can still be called as the function that it was.
+It can still be called as the function that it was. Of an empty mask a metric is NaN.
 """
 
 from __future__ import annotations
@@ -93,7 +93,8 @@ def metric(
         name: its key in ``compare.json``.
         heading: its column in the table of ``ldtrefl compare``; None for none.
         format: how its value is written there, such as ``.4f``.
-        place: columns are sorted by this number, then by name.
+        place: columns are sorted by this number, then by name: metrics of images have 10 to 40, of hits 50 to 70, and
+            those that do not say come last.
     """
 
     def made(function: Callable[Parameters, float]) -> Metric[Parameters]:
