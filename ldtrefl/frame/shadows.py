@@ -30,13 +30,13 @@ def shadow_ray(record: ObjectRecord, surface: Surface, towards: wp.vec3, distanc
     ray = into_unit(record, surface.position, towards)
     outwards = unit_normal(record, surface.facet)
     shadow = ShadowRay()
-    shadow.query.direction = ray.way
+    shadow.query.direction = ray.direction
     shadow.query.t_max = distance * ray.stretch
     if is_own:
-        shadow.query.origin = start_above_own(record, surface.triangle, ray.start, outwards)
+        shadow.query.origin = start_above_own(record, surface.triangle, ray.origin, outwards)
         shadow.outwards = outwards
     else:
-        shadow.query.origin = start_above(ray.start, outwards)
+        shadow.query.origin = start_above(ray.origin, outwards)
     return shadow
 
 

@@ -5,7 +5,20 @@ meshes, and asked once per frame, or once for each band of a large one. It keeps
 may use again is kept by the renderer (``frame/history.py``). It is never asked by two threads at once.
 
 A ``RaylessMethod`` is handed the G-buffer, and answers for its ``reflector_pixels``. A ``RayMethod`` is handed the rays
-that leave those pixels, too. Shadows are asked of the renderer's tracer, which the method's class chooses.
+that leave those pixels, too. Shadows are asked of the renderer's tracer, which the method's class chooses. A method
+that paints the shading normal is whole with these lines::
+
+    class Normals(RaylessMethod):
+        \"\"\"The shading normal in place of the reflection.\"\"\"
+
+        name = "normals"
+
+        def reflect(self, gbuffer: GBuffer, stats: Stats) -> wp.array:
+            _, normals = gbuffer.surfaces  # of all pixels, in device space, whose axes are the world's
+            colors = 0.5 + 0.5 * normals.numpy()[gbuffer.reflector_pixels.numpy()]
+            return wp.array(colors, dtype=wp.vec3, device=self.scene.device)
+
+``envmap.py`` shows a ``Config`` of one's own, and a kernel.
 """
 
 from __future__ import annotations

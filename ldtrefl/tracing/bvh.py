@@ -19,7 +19,7 @@ from ldtrefl.tracing.outlier_hits import is_outlier_met, merge_outliers
 from ldtrefl.tracing.tracer import Query, Tracer, array_of_views
 from ldtrefl.world.device_mesh import DeviceMesh
 from ldtrefl.world.outliers import Outliers
-from ldtrefl.world.unit_rays import SPHERE, distance_passed
+from ldtrefl.world.unit_rays import SPHERE_RADIUS, distance_passed
 
 
 @wp.struct
@@ -35,7 +35,7 @@ def closest_hit_in_bulk(views: wp.array(dtype=BvhView), index: int, query: Query
     """The first triangle that a ray meets, outliers left out."""
     hit = no_hit()
     if query.t_max > 0.0:
-        passed = distance_passed(query.origin, query.direction, SPHERE)
+        passed = distance_passed(query.origin, query.direction, SPHERE_RADIUS)
         origin = as_single(point_along(query.origin, query.direction, passed))
         found = wp.mesh_query_ray(views[index].mesh, origin, query.direction, query.t_max - passed)
         if found.result:
@@ -65,7 +65,7 @@ def occluded_bvh(views: wp.array(dtype=BvhView), index: int, query: Query, outwa
         return True
     if not query.t_max > 0.0:
         return False
-    passed = distance_passed(query.origin, query.direction, SPHERE)
+    passed = distance_passed(query.origin, query.direction, SPHERE_RADIUS)
     origin = as_single(point_along(query.origin, query.direction, passed))
     return wp.mesh_query_ray_anyhit(views[index].mesh, origin, query.direction, query.t_max - passed)
 

@@ -136,8 +136,8 @@ def closest_hits_kernel(tracer: Tracer, block: int, bounds: bool = True) -> wp.K
                     if source >= 0 and has_bit(bits_without_source(sets, objects, source, i, word), k):
                         if to_infinity or may_meet(objects[k], rays.origin[i], rays.direction[i], hits.t[i]):
                             ray = into_unit(objects[k], rays.origin[i], rays.direction[i])
-                            queries[count].origin = ray.start
-                            queries[count].direction = ray.way
+                            queries[count].origin = ray.origin
+                            queries[count].direction = ray.direction
                             # t stays in device units: divide by the direction's length in unit space.
                             queries[count].t_max = wp.where(to_infinity, wp.inf, BEYOND * hits.t[i] * ray.stretch)
                             searched[count].ray = i

@@ -1,7 +1,7 @@
-"""Rays in an object's unit space: how they get there, start near the object, and leave its surface.
+"""Rays in an object's unit space: how they get there, where they start being searched for, how they leave a surface.
 
-One way for every tracer. Origins are float64 until the ray has come near: a small object far from where the ray starts,
-or in a scene that is a million times larger, is met as precisely as alone.
+Every tracer uses these functions. A ray's origin is float64 until the ray is near the object. So a small object that is
+far from where the ray starts, or stands in a scene a million times larger, is met as precisely as if it were alone.
 """
 
 from __future__ import annotations
@@ -12,23 +12,23 @@ from ldtrefl.geometry.vectors import as_double, as_single
 from ldtrefl.world.records import ObjectRecord
 
 NEAR = wp.constant(wp.float64(8.0))
-"""Unit space: coordinates up to which float32 does for where a ray starts."""
+"""Unit space: the largest coordinate of a ray's origin for which float32 is precise enough."""
 
-SPHERE = wp.constant(wp.float64(1.75))
-"""Radius of a sphere about the unit cube."""
+SPHERE_RADIUS = wp.constant(wp.float64(1.75))
+"""Unit space: radius of a sphere about 0 that holds the unit cube, whose corners are 1.732 away."""
 
 LEAVING = wp.constant(wp.float64(1.0e-6))
-"""How far above its own triangle a ray leaves, unit space: 16 roundings of a float32. A point of
-a triangle is off by three, and what tests it again by as many (Waechter and Binder 2019, "A Fast and Robust Method for
-Avoiding Self-Intersection")."""
+"""Unit space: how far above its own triangle a ray starts. That is 16 roundings of a float32. A point of a triangle is
+off by three of them, and a test against the triangle by as many (Waechter and Binder 2019, "A Fast and Robust Method
+for Avoiding Self-Intersection")."""
 
 
 @wp.struct
 class UnitRay:
     """A ray in an object's unit space."""
 
-    start: wp.vec3d
-    way: wp.vec3  # unit
+    origin: wp.vec3d
+    direction: wp.vec3  # unit
     stretch: float  # length in unit space of a device unit along the ray
 
 
@@ -36,27 +36,29 @@ class UnitRay:
 def into_unit(record: ObjectRecord, origin: wp.vec3d, direction: wp.vec3) -> UnitRay:
     """A ray of device space in the unit space of an object."""
     ray = UnitRay()
-    way = record.unit_from_direction * direction
-    length = wp.length(way)
+    scaled = record.unit_from_direction * direction
+    length = wp.length(scaled)
     ray.stretch = length * record.unit_per_device
-    ray.way = way / length
-    ray.start = wp.transform_point(record.unit_from_device, origin)
+    ray.direction = scaled / length
+    ray.origin = wp.transform_point(record.unit_from_device, origin)
     return ray
 
 
 @wp.func
 def distance_passed(origin: wp.vec3d, direction: wp.vec3, radius: wp.float64) -> float:
-    """How far, in lengths of ``direction``, a ray may go before it comes to a sphere about the unit cube: in float64,
-    which rounds its start the less the nearer it has come."""
-    way = as_double(direction)
-    square = wp.dot(way, way)
-    along = -wp.dot(origin, way) - radius * wp.sqrt(square)
+    """The t that a ray may skip, because it is still outside a sphere about the unit cube; 0 if it starts inside.
+
+    Found in float64: the ray's new origin, near the object, is then rounded to float32 without loss.
+    """
+    exact = as_double(direction)
+    square = wp.dot(exact, exact)
+    along = -wp.dot(origin, exact) - radius * wp.sqrt(square)
     return float(wp.max(along, wp.float64(0.0)) / square)
 
 
 @wp.func
 def unit_vertex(record: ObjectRecord, vertex: int) -> wp.vec3d:
-    """A vertex in unit space, as exactly as it is known."""
+    """A vertex in unit space: in float64 if the mesh has outliers, else its float32 coordinates."""
     if record.exact_vertices.shape[0] > 0:
         return record.exact_vertices[vertex]
     return as_double(record.vertices[vertex])
@@ -64,21 +66,27 @@ def unit_vertex(record: ObjectRecord, vertex: int) -> wp.vec3d:
 
 @wp.func
 def unit_normal(record: ObjectRecord, normal: wp.vec3) -> wp.vec3:
-    """A normal of device space in the unit space of an object, unit."""
+    """A normal of device space, brought to the unit space of an object and to unit length."""
     return wp.normalize(as_single(wp.transform_vector(wp.transpose(record.device_from_unit), as_double(normal))))
 
 
 @wp.func
 def start_above(start: wp.vec3d, outwards: wp.vec3) -> wp.vec3d:
-    """Where a ray starts for an object that may touch the surface that it leaves to the side of ``outwards``: above it
-    by the rounding of that object's own coordinates. In its unit space."""
+    """Where a ray starts that leaves one object's surface and is searched for in another, which may touch it.
+
+    It starts above the surface, to the side of ``outwards``, by the rounding of the other object's coordinates. All is
+    in the other object's unit space.
+    """
     return start + LEAVING * as_double(outwards)
 
 
 @wp.func
 def start_above_own(record: ObjectRecord, triangle: int, start: wp.vec3d, outwards: wp.vec3) -> wp.vec3d:
-    """Where a ray starts for the object that it leaves: above the plane of its own triangle by the rounding of the
-    coordinates there. What met the ray may have left ``start`` a little off that plane. In unit space."""
+    """Where a ray starts that is searched for in the object that it leaves, in unit space.
+
+    It starts above the plane of the triangle that it leaves, to the side of ``outwards``, by the rounding of
+    coordinates there. ``start`` may lie a little off that plane: its hit was rounded, or was on a patch.
+    """
     corners = record.faces[triangle]
     a = unit_vertex(record, corners[0])
     across = wp.cross(unit_vertex(record, corners[1]) - a, unit_vertex(record, corners[2]) - a)

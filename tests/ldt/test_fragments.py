@@ -9,7 +9,7 @@ import ldtrefl
 from ldtrefl.scene import shapes
 from tests.conftest import CLOSED_MESHES
 
-CLOSED_SHAPES = ("box", "bowl", "genus3", "gyroid", "hollow_box", "room", "sphere", "torus", "torus_knot", "wires")
+CLOSED_SHAPES = [name for name, shape in shapes.all_shapes().items() if shape.is_closed]
 
 
 def odd_texels(maps: ldtrefl.LayeredDepthTexture) -> int:

@@ -7,8 +7,10 @@
 
 The function's annotations are its parameters' limits, which pydantic checks; every parameter has a default.
 ``needed_bytes`` has the same parameters and estimates the memory, so that what is too large is refused before it is
-made. ``surfaces.py`` and ``marching_cubes.py`` hold what shapes are made of. ``tests/scene/shapes/test_base.py``
-checks every shape that is found; what is true of one alone is checked in a test of its own.
+made. ``surfaces.py`` and ``marching_cubes.py`` hold what shapes are made of; a shape of several parts, with a hard edge
+between them, joins them (``joined``, as in ``hollow_box.py``). ``tests/scene/shapes/test_base.py`` checks every shape
+that is found: by default it lies about the origin to float32's rounding, and fits in the cube from -1 to 1. What is
+true of one shape alone is checked in a test of its own, with the helpers of that file.
 """
 
 from __future__ import annotations
