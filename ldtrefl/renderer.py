@@ -47,10 +47,12 @@ WORKING_BYTES = 200
 class Renderer:
     """Renders frames of one scene by one method; keeps between frames what the next one can use.
 
-    A frame has the bits that a new renderer of the same scene gives, whatever was rendered and moved before. Threads
-    may share a renderer: it makes one frame at a time, and a move counts from the next frame that begins; to move and
-    to render are two calls, between which another thread's may come. Different renderers work at the same time, on the
-    same meshes, too. After a call that fails or is stopped the scene is as it was, and the next frame is right.
+    A frame has the bits that a new renderer of ``scene`` gives, whatever was rendered and moved before. Another
+    scene, laid out with its objects where they have moved to, gives the same picture but for rounding: rays travel
+    in a space that is fixed by the box about all objects as they were laid out. Threads may share a renderer: it
+    makes one frame at a time, and a move counts from the next frame that begins; to move and to render are two
+    calls, between which another thread's may come. Different renderers work at the same time, on the same meshes,
+    too. After a call that fails or is stopped the scene is as it was, and the next frame is right.
     """
 
     def __init__(self, scene: Scene, method: str | None = None, device: str | None = None, **options: object) -> None:
