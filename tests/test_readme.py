@@ -3,8 +3,7 @@
 import inspect
 import re
 import shlex
-import subprocess
-import sys
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -13,11 +12,14 @@ import trimesh
 
 import ldtrefl
 from ldtrefl.cli import commands as command_files
+from ldtrefl.cli.program import main
 from ldtrefl.frame.skip_options import skip_names
 from ldtrefl.methods import all_methods
 from ldtrefl.scene import shapes
 from tests import documents
 from tests.documents import PAGES, ROOT, Block
+
+Complaints = Callable[[], list[str]]
 
 SCENE_REFERENCE = ROOT / "docs" / "scenes.md"
 
@@ -32,27 +34,39 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def succeeds(arguments: list[str], folder: Path) -> None:
-    done = subprocess.run(arguments, cwd=folder, capture_output=True, text=True, check=False, timeout=300)
-    complaints = [line for line in done.stderr.splitlines() if not line.startswith("ldtrefl: compiling kernels")]
-    assert done.returncode == 0 and not complaints, done.stderr
+@pytest.fixture
+def complaints(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> Iterator[Complaints]:
+    """Says what has been printed on standard error; code of pages runs in ``folder``, and leaves no setting behind."""
+    monkeypatch.chdir(folder)
+    capfd.readouterr()
+
+    def lines() -> list[str]:
+        said = capfd.readouterr().err.splitlines()
+        return [line for line in said if not line.startswith("ldtrefl: compiling kernels")]
+
+    yield lines
+    ldtrefl.set_memory_limit()
+    ldtrefl.keep_maps_in(None)
 
 
 @pytest.mark.parametrize("block", documents.blocks("python"), ids=str)
-def test_python_runs_as_it_stands(block: Block, folder: Path) -> None:
+def test_python_runs_as_it_stands(block: Block, folder: Path, complaints: Complaints) -> None:
     before = set(folder.iterdir())
-    succeeds([sys.executable, "-c", block.code], folder)
+    exec(compile(block.code, str(block), "exec"), {"__name__": "__main__"})
+    assert not complaints()
     written = {path.name for path in set(folder.iterdir()) - before}
     expected = set(re.findall(r'(?:save_image|save)\("([^"]+)"', block.code))
     assert expected <= written
 
 
 @pytest.mark.parametrize("block", documents.commands(), ids=str)
-def test_commands_run_as_they_stand(block: Block, folder: Path) -> None:
+def test_commands_run_as_they_stand(block: Block, complaints: Complaints) -> None:
     arguments = shlex.split(block.code)
-    succeeds([sys.executable, "-m", "ldtrefl", *arguments], folder)
+    assert main(arguments) == 0 and not complaints()
     if "-o" in arguments:
-        assert (folder / arguments[arguments.index("-o") + 1]).exists()
+        assert Path(arguments[arguments.index("-o") + 1]).exists()
 
 
 def scene_of(block: Block) -> str:
