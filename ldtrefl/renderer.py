@@ -196,7 +196,8 @@ class Renderer:
         method, device = self._method, gbuffer.scene.device
         shadow = self._shadow_tracer(gbuffer, stats)
         with stats.stage("shade", device):
-            shaded = shade_gbuffer(gbuffer, shadow, starts_rays=isinstance(method, RayMethod))
+            starts_rays, spare = isinstance(method, RayMethod), self._history.take_spare_radiance()
+            shaded = shade_gbuffer(gbuffer, shadow, starts_rays=starts_rays, radiance=spare)
         if not gbuffer.reflector_pixels.shape[0] and self._skip.reflection:
             reflected = ReflectedLight(wp.empty(0, dtype=wp.vec3, device=device))
         elif isinstance(method, RayMethod):

@@ -100,10 +100,13 @@ class Shaded:
     """The rays of the first reflection, one for each of those pixels and in their order; none if none are started."""
 
 
-def shade_gbuffer(gbuffer: GBuffer, shadow: BoundTracer, *, starts_rays: bool) -> Shaded:
+def shade_gbuffer(
+    gbuffer: GBuffer, shadow: BoundTracer, *, starts_rays: bool, radiance: wp.array | None = None
+) -> Shaded:
     """Shade every pixel with the shadows that ``shadow`` answers; start the rays of those that see a reflector."""
     scene, device, pixels = gbuffer.scene, gbuffer.scene.device, gbuffer.reflector_pixels
-    radiance = wp.empty(gbuffer.pixel_count, dtype=wp.vec3, device=device)
+    if radiance is None or radiance.shape[0] != gbuffer.pixel_count:
+        radiance = wp.empty(gbuffer.pixel_count, dtype=wp.vec3, device=device)
     inputs = [gbuffer.view, scene.records, scene.lighting, shadow.views]
     launch.launch(shade_pixels_kernel(shadow.tracer), gbuffer.pixel_count, [*inputs, radiance], device)
     count = pixels.shape[0]

@@ -12,6 +12,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import warp as wp
+
 from ldtrefl.frame.camera_shading import Shaded
 from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.reflected_light import ReflectedLight
@@ -76,6 +78,8 @@ class FrameHistory:
         self._reflected: ReflectedLight | None = None
         """What the last frame reflected. It is kept longer than ``_parts``: the next frame may use it again."""
         self._still: _Still | None = None
+        self._spare_radiance: wp.array | None = None
+        """Of the last frame's pixels, to be written over: memory that is new to the process is slow to write."""
 
     @property
     def last_view(self) -> tuple[DeviceScene, Camera] | None:
@@ -103,6 +107,8 @@ class FrameHistory:
         """Draw what ``camera`` sees of a scene. The last frame is dropped first, so that its memory is used again."""
         everything = frozenset(range(len(scene.objects)))
         moved = self._moved(scene, camera)
+        if self._parts is not None:
+            self._spare_radiance = self._parts.shaded.radiance
         self._parts = None
         if moved is None or moved == everything:
             self._still = None
@@ -117,13 +123,19 @@ class FrameHistory:
         drawing.add(scene, camera, sorted(still.moving))
         return resolved(drawing, scene, camera)
 
+    def take_spare_radiance(self) -> wp.array | None:
+        """An array for the radiance of a frame's pixels, if there is one of an earlier frame that nobody reads."""
+        spare, self._spare_radiance = self._spare_radiance, None
+        return spare
+
     def keep(self, scene: DeviceScene, camera: Camera, parts: FrameParts) -> None:
         """Remember a frame that was made as a whole."""
-        self._view, self._parts, self._reflected = _View(scene, camera), parts, parts.reflected
+        self._view, self._parts = _View(scene, camera), parts
+        self._reflected = None if parts.reflected.followed is None else parts.reflected
 
     def forget(self) -> None:
         """Drop everything: the next frame is too large to be kept."""
-        self._view = self._parts = self._reflected = self._still = None
+        self._view = self._parts = self._reflected = self._still = self._spare_radiance = None
 
     def keep_view(self, scene: DeviceScene, camera: Camera) -> None:
         """Remember what was seen in a frame that was made in bands, and nothing else of it."""

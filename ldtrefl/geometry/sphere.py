@@ -15,23 +15,25 @@ def meets_sphere(origin: wp.vec3d, direction: wp.vec3, centre: wp.vec3d, radius:
     """Whether a ray meets a sphere, or begins inside it: the same answer as ``sphere_entry``'s without its root."""
     offset, way = centre - origin, as_double(direction)
     square = wp.float64(radius) * wp.float64(radius)
+    if wp.dot(offset, way) < wp.float64(0.0) and wp.dot(offset, offset) > square:
+        return False  # the sphere lies behind
     # |offset x way| is the distance of the centre from the ray, in lengths of the direction.
     aside = wp.cross(offset, way)
-    if wp.dot(aside, aside) > square * wp.dot(way, way):
-        return False
-    return wp.dot(offset, way) >= wp.float64(0.0) or wp.dot(offset, offset) <= square
+    return wp.dot(aside, aside) <= square * wp.dot(way, way)
 
 
 @wp.func
 def sphere_entry(origin: wp.vec3d, direction: wp.vec3, centre: wp.vec3d, radius: float) -> float:
     """Where a ray enters a sphere: t, 0 from inside, -1 if it misses it."""
     offset, way = centre - origin, as_double(direction)
-    length_squared = wp.dot(way, way)
-    aside = wp.cross(offset, way)
-    half_chord_squared = wp.float64(radius) * wp.float64(radius) * length_squared - wp.dot(aside, aside)
+    square = wp.float64(radius) * wp.float64(radius)
+    along = wp.dot(offset, way)
+    if wp.dot(offset, offset) <= square:
+        return 0.0
+    if along < wp.float64(0.0):
+        return -1.0
+    aside, length_squared = wp.cross(offset, way), wp.dot(way, way)
+    half_chord_squared = square * length_squared - wp.dot(aside, aside)
     if half_chord_squared < wp.float64(0.0):
         return -1.0
-    along, half_chord = wp.dot(offset, way), wp.sqrt(half_chord_squared)
-    if along + half_chord < wp.float64(0.0):
-        return -1.0
-    return float(wp.max(along - half_chord, wp.float64(0.0)) / length_squared)
+    return float((along - wp.sqrt(half_chord_squared)) / length_squared)

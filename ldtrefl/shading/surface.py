@@ -61,19 +61,11 @@ def extended_coordinates(record: ObjectRecord, triangle: int, point: wp.vec3d) -
 
 
 @wp.func
-def facing_facet(objects: wp.array(dtype=ObjectRecord), index: int, across: wp.vec3, view: wp.vec3) -> wp.vec3:
-    """A facet's normal ``across`` in unit space, of any length, turned to the side that the viewer sees."""
-    if wp.dot(objects[index].normal_from_unit * across, view) > 0.0:
-        return -across
-    return across
-
-
-@wp.func
-def shading_normal(
-    objects: wp.array(dtype=ObjectRecord), index: int, corners: wp.vec3i, u: float, v: float, across: wp.vec3
+def interpolated_normal(
+    objects: wp.array(dtype=ObjectRecord), index: int, corners: wp.vec3i, u: float, v: float, facet: wp.vec3
 ) -> wp.vec3:
-    """The unit normal that a point is shaded with: interpolated, on the side of the facet's normal ``across``; or the
-    facet's own where the object is not smooth, or its normals say nothing there."""
+    """The vertex normals interpolated at barycentrics (u, v), in device space, of any length, on the side of the
+    facet's normal; that one itself where the object is not smooth, or the vertex normals say nothing."""
     normal = wp.vec3(0.0)
     if objects[index].smooth != 0:
         interpolated = (
@@ -83,11 +75,11 @@ def shading_normal(
         )
         if wp.dot(interpolated, interpolated) > SMALLEST_NORMAL:
             normal = objects[index].normal_from_unit * wp.normalize(interpolated)
-            if wp.dot(normal, objects[index].normal_from_unit * across) < 0.0:
+            if wp.dot(normal, facet) < 0.0:
                 normal = -normal
     if normal == wp.vec3(0.0):
-        normal = objects[index].normal_from_unit * wp.normalize(across)
-    return wp.normalize(normal)
+        return facet
+    return normal
 
 
 @wp.func
@@ -134,9 +126,11 @@ def surface_at(
     surface.triangle = triangle
     point = (1.0 - u - v) * a + u * b + v * c
     surface.position = wp.transform_point(objects[index].device_from_unit, as_double(point))
-    across = facing_facet(objects, index, wp.cross(b - a, c - a), view)
-    surface.facet = wp.normalize(objects[index].normal_from_unit * wp.normalize(across))
-    surface.normal = shading_normal(objects, index, corners, u, v, across)
+    facet = objects[index].normal_from_unit * wp.normalize(wp.cross(b - a, c - a))
+    if wp.dot(facet, view) > 0.0:
+        facet = -facet  # to the side that the viewer sees
+    surface.facet = wp.normalize(facet)
+    surface.normal = wp.normalize(interpolated_normal(objects, index, corners, u, v, facet))
     surface.albedo = albedo_at(objects, index, triangle, corners, u, v)
     surface.emission = objects[index].emission
     surface.mirror = objects[index].mirror
