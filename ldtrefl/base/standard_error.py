@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import atexit
+import fcntl
 import logging
 import os
 import re
@@ -24,63 +26,90 @@ beginning: another thread may have begun that."""
 STDERR = 2
 """The file descriptor of standard error."""
 
+PIECE_BYTES = 1 << 16
+"""Of what was caught, read at a time."""
+
+PIPE_BYTES = 4096
+"""What a pipe takes in one write, whoever else writes (Linux's ``PIPE_BUF``)."""
+
 
 class _Catching:
     """Standard error put aside in a file. The descriptor is the whole process's: it is put aside once, however many
-    threads are inside a block."""
+    threads are inside a block.
+
+    The file stays open from block to block, as a thread may be in the middle of a write to it when standard error is
+    put back. What arrives so late is printed after a later block, or at the end of the process.
+    """
 
     def __init__(self) -> None:
         self.lock = threading.Lock()
         self.blocks = 0  # threads' blocks that are open
         self.usual = -1  # a duplicate of the usual descriptor; -1 if nothing is caught
-        self.caught = -1  # of the file that stands in for it meanwhile
+        self.file = -1  # descriptor of the file that stands in for it; -1 before the first block
+        self.printed = 0  # bytes of that file that are dealt with
 
     def begin(self) -> None:
         """Enter a block; the first one puts standard error aside."""
         self.blocks += 1
         if self.blocks > 1:
             return
-        opened: list[int] = []
+        usual = -1
         try:
-            opened.append(os.dup(STDERR))
-            opened.append(_scratch_file())
-            os.dup2(opened[1], STDERR)
+            usual = os.dup(STDERR)
+            if self.file < 0:
+                self.file, self.printed = _scratch_file(), 0
+                # Every write goes to the end, whoever else writes.
+                fcntl.fcntl(self.file, fcntl.F_SETFL, fcntl.fcntl(self.file, fcntl.F_GETFL) | os.O_APPEND)
+            os.dup2(self.file, STDERR)
         except OSError:
             # Standard error is closed, or there is no room for a file: nothing is caught, nothing is changed.
-            for descriptor in opened:
-                os.close(descriptor)
+            if usual >= 0:
+                os.close(usual)
             return
-        self.usual, self.caught = opened
+        self.usual = usual
 
     def end(self) -> None:
         """Leave a block; the last one puts standard error back and prints what others than libraries wrote."""
         self.blocks -= 1
         if self.blocks or self.usual < 0:
             return
+        # Most of it first, so that it stands before what threads print as soon as standard error is back.
+        self.print_caught(self.usual)
         os.dup2(self.usual, STDERR)
-        size = os.lseek(self.caught, 0, os.SEEK_END)
-        os.lseek(self.caught, 0, os.SEEK_SET)
-        with open(self.caught, "rb") as file:
-            caught = file.read(size)
         os.close(self.usual)
-        self.usual = self.caught = -1
-        # What else was printed meanwhile, by other threads, belongs where it was meant to go.
-        rest = CHATTER.sub(b"", caught)
+        self.usual = -1
+        self.print_caught()
+
+    def print_caught(self, descriptor: int = STDERR) -> None:
+        """Print what was caught and has not been printed, but for ``CHATTER``, to a descriptor."""
+        if self.file < 0 or (descriptor == STDERR and self.usual >= 0):
+            return
+        caught = b""
+        while piece := os.pread(self.file, PIECE_BYTES, self.printed + len(caught)):
+            caught += piece
+        self.printed += len(caught)
+        # In short pieces of whole lines: a pipe takes each in one, whatever another thread writes meanwhile.
+        text = b""
         with suppress(OSError):
-            while rest:
-                rest = rest[os.write(STDERR, rest) :]
+            for line in [*CHATTER.sub(b"", caught).splitlines(keepends=True), b""]:
+                if not line or len(text) + len(line) > PIPE_BYTES:
+                    while text:
+                        text = text[os.write(descriptor, text) :]
+                text += line
 
     def after_fork_in_child(self) -> None:
         """Forget all blocks: their threads do not exist here, and the parent prints what was caught."""
         if self.usual >= 0:
             os.dup2(self.usual, STDERR)
             os.close(self.usual)
-            os.close(self.caught)
-        self.blocks, self.usual, self.caught = 0, -1, -1
+        if self.file >= 0:
+            os.close(self.file)
+        self.blocks, self.usual, self.file, self.printed = 0, -1, -1, 0
         self.lock.release()
 
 
 _catching = _Catching()
+atexit.register(_catching.print_caught)
 # No thread is in the middle of begin or end while another forks.
 os.register_at_fork(
     before=_catching.lock.acquire,
