@@ -25,8 +25,13 @@ def test_items_that_int32_cannot_number(start: Callable[..., None]) -> None:
 
 @pytest.mark.parametrize("start", [launch.launch, launch.launch_in_order])
 def test_no_items_launch_nothing(start: Callable[..., None]) -> None:
+    device = launch.resolve_device(None)
+    numbers = wp.zeros(2, dtype=int, device=device)
     for count in (0, -1):
-        start(add_number, count, ["not an array"], launch.resolve_device(None))
+        start(add_number, count, [numbers], device)
+        np.testing.assert_array_equal(numbers.numpy(), [0, 0])
+    start(add_number, 1, [numbers], device)
+    np.testing.assert_array_equal(numbers.numpy(), [1, 0])
 
 
 def test_numbers_of_threads() -> None:

@@ -5,6 +5,7 @@ import pytest
 
 import ldtrefl
 from ldtrefl.ldt.exact import wide_tree
+from ldtrefl.ldt.exact.tree import LANES, TRIANGLE_NUMBER_ROW, TRIANGLE_ROWS
 from ldtrefl.ldt.exact.tree_check import check_tree
 from ldtrefl.scene import shapes
 
@@ -17,9 +18,13 @@ def nested_triangles(count: int) -> ldtrefl.Mesh:
 
 
 @pytest.mark.parametrize("mesh", [shapes.make("box"), shapes.make("torus_knot"), nested_triangles(200)])
-def test_trees_are_sound(mesh: ldtrefl.Mesh) -> None:
+def test_trees_are_sound_and_hold_every_triangle_once(mesh: ldtrefl.Mesh) -> None:
     arrays, values = ldtrefl.peel(mesh.vertices, mesh.faces, quality="exact").tree.packed()
     check_tree(arrays, values, len(mesh.faces))
+    blocks = arrays["rows"].reshape(-1, int(TRIANGLE_ROWS), int(LANES))
+    numbers = blocks[:, int(TRIANGLE_NUMBER_ROW)].view(np.int32)[~np.isnan(blocks[:, 0])]
+    np.testing.assert_array_equal(np.sort(numbers), np.arange(len(mesh.faces)))
+    assert values["records"] == len(mesh.faces)
 
 
 def test_a_tree_that_is_too_deep_is_built_by_halves(monkeypatch: pytest.MonkeyPatch) -> None:
