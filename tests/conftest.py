@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
 import ldtrefl
+from ldtrefl.files.map_cache import MapCache
 from ldtrefl.scene import shapes
 
 SCENES = Path(__file__).parent.parent / "scenes"
@@ -71,6 +72,23 @@ def mesh_or_shape(real_mesh: Callable[[str], ldtrefl.Mesh]) -> Callable[[str], l
 
 
 @pytest.fixture(autouse=True)
-def all_threads() -> None:
-    """Every test starts with all threads."""
+def usual_settings() -> Iterator[None]:
+    """After every test all threads are used, the memory limit is the usual one, and no maps are kept."""
+    yield
     ldtrefl.set_threads()
+    ldtrefl.set_memory_limit()
+    ldtrefl.keep_maps_in(None)
+
+
+@pytest.fixture
+def small_limit() -> None:
+    """A memory limit of 1 MiB."""
+    ldtrefl.set_memory_limit(1 << 20)
+
+
+@pytest.fixture
+def cache(tmp_path: Path) -> MapCache:
+    """A folder that maps are kept in."""
+    kept = MapCache(tmp_path / "maps")
+    ldtrefl.keep_maps_in(kept)
+    return kept

@@ -3,7 +3,7 @@
 import inspect
 import re
 import shlex
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -35,10 +35,8 @@ def folder(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def complaints(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> Iterator[Complaints]:
-    """Says what has been printed on standard error; code of pages runs in ``folder``, and leaves no setting behind."""
+def complaints(folder: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Complaints:
+    """Says what has been printed on standard error; code of pages runs in ``folder``."""
     monkeypatch.chdir(folder)
     capfd.readouterr()
 
@@ -46,9 +44,7 @@ def complaints(
         said = capfd.readouterr().err.splitlines()
         return [line for line in said if not line.startswith("ldtrefl: compiling kernels")]
 
-    yield lines
-    ldtrefl.set_memory_limit()
-    ldtrefl.keep_maps_in(None)
+    return lines
 
 
 @pytest.mark.parametrize("block", documents.blocks("python"), ids=str)

@@ -1,7 +1,5 @@
 """The memory budget: sizes as people write them, limits and where they come from, and what an account adds up."""
 
-from collections.abc import Iterator
-
 import numpy as np
 import pytest
 
@@ -10,12 +8,9 @@ from ldtrefl.base import budget
 
 
 @pytest.fixture(autouse=True)
-def default_limit(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def default_limit(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every test starts with the default limit."""
     monkeypatch.delenv(budget.VARIABLE, raising=False)
-    budget.set_memory_limit(None)
-    yield
-    budget.set_memory_limit(None)
 
 
 @pytest.mark.parametrize(

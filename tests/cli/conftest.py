@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
-import ldtrefl
 from ldtrefl.cli.program import main
 from tests.conftest import SMALL_SCENE
 
@@ -32,7 +31,7 @@ def scene_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.fixture
-def run(scene_folder: Path, capfd: pytest.CaptureFixture[str]) -> Iterator[Callable[..., Done]]:
+def run(scene_folder: Path, capfd: pytest.CaptureFixture[str]) -> Callable[..., Done]:
     """Runs the command line in this process, in the folder of ``scene.toml``."""
     assert scene_folder.is_dir()
 
@@ -43,5 +42,4 @@ def run(scene_folder: Path, capfd: pytest.CaptureFixture[str]) -> Iterator[Calla
         errors = [line for line in said.err.splitlines() if not line.startswith("ldtrefl: compiling kernels")]
         return Done(status, said.out, errors)
 
-    yield run_here
-    ldtrefl.set_memory_limit()  # the last command's holds for the process
+    return run_here

@@ -5,22 +5,13 @@ import multiprocessing
 import os
 import shutil
 import stat
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import ldtrefl
-from ldtrefl.files.map_cache import MapCache, keep_maps_in, key_of
-
-
-@pytest.fixture
-def cache(tmp_path: Path) -> Iterator[MapCache]:
-    kept = MapCache(tmp_path / "maps")
-    keep_maps_in(kept)
-    yield kept
-    keep_maps_in(None)
+from ldtrefl.files.map_cache import MapCache, key_of
 
 
 def small_entry(cache: MapCache) -> bytes:

@@ -1,6 +1,5 @@
 """Textures of mesh files: as they are stored in the file, shared where they are equal, and asked for first."""
 
-from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -11,19 +10,10 @@ from PIL import Image
 
 import ldtrefl
 from ldtrefl import InputError, load_image
-from ldtrefl.base import budget
 from ldtrefl.files.mesh_textures import stored_texture, take_memory_for_textures, texture_of
 from ldtrefl.scene import shapes
 
 COLOR = (200, 100, 50)
-
-
-@pytest.fixture
-def small_limit() -> Iterator[int]:
-    limit = 1 << 20
-    budget.set_memory_limit(limit)
-    yield limit
-    budget.set_memory_limit()
 
 
 def write_glb(path: Path, picture: Image.Image) -> None:
@@ -56,7 +46,7 @@ def test_sixteen_bits_of_a_mesh_are_scaled_and_the_same_picture_is_one(tmp_path:
     np.testing.assert_array_equal(read[0].pixels, load_image(tmp_path / "a.png"))
 
 
-def test_a_glb_of_large_textures_is_asked_for_first(tmp_path: Path, small_limit: int) -> None:
+def test_a_glb_of_large_textures_is_asked_for_first(tmp_path: Path, small_limit: None) -> None:
     write_glb(tmp_path / "a.glb", Image.new("RGB", (400, 400), COLOR))
     with pytest.raises(
         InputError, match=r"a\.glb: a texture of 400 x 400 pixels needs 1\.7 MiB.*, allowed are 1\.0 MiB"

@@ -1,29 +1,18 @@
 """Maps that a layered depth texture keeps on disk: the same answers, and made anew when they are not sound."""
 
-from collections.abc import Iterator
-from pathlib import Path
-
 import numpy as np
 import pytest
 from stress_cases.inputs import rays_about
 
 import ldtrefl
 from ldtrefl.device import launch
-from ldtrefl.files.map_cache import MapCache, current_cache, keep_maps_in
+from ldtrefl.files.map_cache import MapCache, current_cache
 from ldtrefl.files.map_file import Entry
 from ldtrefl.ldt.peel import peel_mesh
 from ldtrefl.scene import shapes
 from ldtrefl.world.device_mesh import DeviceMesh
 
 KNOT = {"segments": [300, 40]}
-
-
-@pytest.fixture
-def cache(tmp_path: Path) -> Iterator[MapCache]:
-    kept = MapCache(tmp_path / "maps")
-    keep_maps_in(kept)
-    yield kept
-    keep_maps_in(None)
 
 
 @pytest.mark.parametrize("search", ["exact", "linear"])

@@ -1,6 +1,5 @@
 """Scene files: wrong input is one line that names the file, the key and what is allowed; what is shared counts once."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -8,13 +7,6 @@ import pytest
 import ldtrefl
 from ldtrefl.base import budget
 from tests.conftest import SMALL_SCENE
-
-
-@pytest.fixture(autouse=True)
-def usual_limit() -> Iterator[None]:
-    yield
-    budget.set_memory_limit()
-
 
 THING = 'shape = "torus"\nparams = { segments = [16, 8] }'
 WRONG = [

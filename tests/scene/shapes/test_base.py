@@ -2,7 +2,6 @@
 
 import gc
 import weakref
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, get_type_hints
 
@@ -47,13 +46,6 @@ def largest(schema: dict[str, Any]) -> object:
 
 
 PARAMETERS = [(name, parameter) for name, shape in shapes.all_shapes().items() for parameter in shape.parameters]
-
-
-@pytest.fixture
-def small_limit() -> Iterator[None]:
-    budget.set_memory_limit(1 << 20)
-    yield
-    budget.set_memory_limit(None)
 
 
 def test_a_shape_is_a_file_of_its_name() -> None:
