@@ -80,7 +80,10 @@ class TriangleMesh:
 
 
 class RaycastingScene:
-    """The part of Open3D's class that its tests use; subclasses name the tracer."""
+    """The part of Open3D's class that its tests use; subclasses name the tracer.
+
+    Methods bear Open3D's names: ``test_occlusions`` is a query of rays, and no test.
+    """
 
     by = "exact"
     INVALID_ID = INVALID_ID
