@@ -7,7 +7,7 @@ fields::
     def mean_difference(image: np.ndarray, reference: np.ndarray, mask: np.ndarray) -> float:
         return float(np.abs(image - reference)[mask].mean())
 
-It can still be called as the function that it was. Of an empty mask a metric is NaN.
+It can still be called as the function that it was. An average over an empty mask is NaN.
 """
 
 from __future__ import annotations
