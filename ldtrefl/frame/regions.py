@@ -130,14 +130,18 @@ class Regions:
     """Objects that at least one ray can meet."""
 
 
-def all_objects(scene: DeviceScene) -> Regions:
-    """Every ray may meet every object but its own."""
-    sets = sets_of_runs(wp.empty((0, 0), dtype=wp.uint32, device=scene.device))
+def objects_that_rays_meet(scene: DeviceScene) -> set[int]:
+    """Objects that a reflected ray may meet, if each may meet every object but its own."""
     mirrors = {entry.index for entry in scene.reflectors}
     # All rays leave the only mirror, so none meets it.
     alone = mirrors if len(mirrors) == 1 else set()
-    shown = set(range(len(scene.objects))) - alone if mirrors else set()
-    return Regions(sets, shown)
+    return set(range(len(scene.objects))) - alone if mirrors else set()
+
+
+def all_objects(scene: DeviceScene) -> Regions:
+    """Every ray may meet every object but its own."""
+    sets = sets_of_runs(wp.empty((0, 0), dtype=wp.uint32, device=scene.device))
+    return Regions(sets, objects_that_rays_meet(scene))
 
 
 def safe_regions(gbuffer: GBuffer, rays: RayBuffer, bounce: int, stats: Stats) -> Regions:

@@ -31,7 +31,7 @@ from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.history import Reusable
 from ldtrefl.frame.reflected_light import ReflectedLight
 from ldtrefl.frame.refollow import changed_runs, follow_changed
-from ldtrefl.frame.regions import Regions, all_objects, safe_regions
+from ldtrefl.frame.regions import Regions, all_objects, objects_that_rays_meet, safe_regions
 from ldtrefl.ldt.options import (
     BINARY_STEPS,
     DEFAULT_QUALITY,
@@ -195,4 +195,4 @@ class Ldt(RayMethod):
         objects stand still: to test each ray against their spheres is then as fast as to test runs of rays."""
         if len(self.scene.objects) > FEW_OBJECTS or self._has_moved or self.config.error is not None:
             return True
-        return not self.tracer.has_usual_maps(self.scene, all_objects(self.scene).shown)
+        return not self.tracer.has_usual_maps(self.scene, objects_that_rays_meet(self.scene))
