@@ -167,7 +167,8 @@ class RayFollower:
         radiance = wp.zeros(count, dtype=wp.vec3, device=device)
         hits = first_hits = empty_hits(count, device)
         followed = FollowedRays(rays, regions.sets, first_hits, radiance)
-        going = self._copied(rays)
+        # Bounces change the rays; the last one writes nothing but the source.
+        going = cloned(RayBuffer, rays, ("source",) if self.max_bounces == 1 else None)
         for bounce in range(self.max_bounces):
             is_last = bounce + 1 == self.max_bounces
             if not self.bounce(going, regions, hits, radiance, is_last=is_last):
@@ -208,18 +209,3 @@ class RayFollower:
         stats.count("steps", int(hits.steps.numpy().sum(dtype=np.int64)))
         stats.count("searches", searches)
         stats.count("searches_saved", alive * (len(self.gbuffer.scene.objects) - 1) - searches)
-
-    def _copied(self, rays: RayBuffer) -> RayBuffer:
-        """A copy of the rays, which bounces may change. A single bounce writes nothing but the source."""
-        if self.max_bounces > 1:
-            return cloned(RayBuffer, rays)
-        going = RayBuffer()
-        going.pixel, going.origin, going.direction, going.throughput, going.source_triangle = (
-            rays.pixel,
-            rays.origin,
-            rays.direction,
-            rays.throughput,
-            rays.source_triangle,
-        )
-        going.source = wp.clone(rays.source)
-        return going

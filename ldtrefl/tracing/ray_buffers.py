@@ -6,7 +6,7 @@ they bring can be summed in a fixed order.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import TypeVar
 
 import numpy as np
@@ -105,11 +105,12 @@ def empty_hits(count: int, device: wp.Device) -> HitBuffer:
     return hits
 
 
-def cloned(kind: type[Buffer], buffer: Buffer) -> Buffer:
-    """A copy of a buffer; ``kind`` is its type."""
+def cloned(kind: type[Buffer], buffer: Buffer, names: Collection[str] | None = None) -> Buffer:
+    """A copy of a buffer, or of these of its arrays, the others shared; ``kind`` is its type."""
     made = kind()
     for name in _arrays_of(kind):
-        setattr(made, name, wp.clone(getattr(buffer, name)))
+        array = getattr(buffer, name)
+        setattr(made, name, wp.clone(array) if names is None or name in names else array)
     return made
 
 

@@ -64,10 +64,7 @@ def test_the_last_of_many_counts(size: int) -> None:
     vertices, faces = some_mesh(size, size)
     for threads in (1, 3):
         launch.set_threads(threads)
-        try:
-            mesh = ldtrefl.Mesh(vertices, faces)
-        finally:
-            launch.set_threads()
+        mesh = ldtrefl.Mesh(vertices, faces)
         used = vertices[np.unique(faces)]
         assert mesh.bounds[1, 0] == 9.0
         assert mesh.bounds.tobytes() == np.stack([used.min(axis=0), used.max(axis=0)]).tobytes()

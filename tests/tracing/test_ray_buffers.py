@@ -91,6 +91,14 @@ def test_a_clone_has_memory_of_its_own() -> None:
     assert values(copy) == before and values(rays) != before
 
 
+def test_a_clone_of_some_arrays_shares_the_others() -> None:
+    rays = some_rays(4, 2)
+    copy = cloned(RayBuffer, rays, ("source",))
+    for name in RayBuffer.vars:
+        assert (getattr(copy, name).ptr == getattr(rays, name).ptr) == (name != "source"), name
+    assert values(copy) == values(rays)
+
+
 def test_distance_across_is_that_of_the_rays_at_t() -> None:
     origin, direction = np.zeros((2, 3)), np.array([[0.0, 0.0, 1.0]] * 2)
     other = np.array([[0.0, 0.1, 5.0], [0.0, 0.0, 0.0]])
