@@ -87,8 +87,6 @@ class Ldt(RayMethod):
 
     def __init__(self, scene: DeviceScene, config: CommonConfig, tracer: SceneTracer) -> None:
         super().__init__(scene, config, tracer)
-        self._foreseen: tuple[GBuffer, Mapping[DeviceMesh, int]] | None = None
-        """A frame's G-buffer and the resolutions chosen for it, if shadows were asked for before reflections."""
         self._has_moved = False
         """Whether any object has moved. Culling then pays: it tells which rays of the last frame serve again."""
 
@@ -106,14 +104,13 @@ class Ldt(RayMethod):
 
     def foresee(self, gbuffer: GBuffer, stats: Stats) -> None:
         """Choose maps for the frame's shadows that are as fine as its reflections need them, too."""
-        self._foreseen, self.tracer.chosen = None, {}
+        self.tracer.chosen = {}
         self.tracer.drop_old_maps()
         if self._chooses:
             with stats.stage("cull", self.scene.device):
                 rays = shade_gbuffer(gbuffer, no_shadows(self.scene.device), starts_rays=True).rays
                 # Counted when the rays themselves are culled.
                 self.tracer.chosen = self._resolutions(gbuffer, rays, self._culled(gbuffer, rays, 0, Stats()))
-            self._foreseen = gbuffer, self.tracer.chosen
 
     def reflect_rays(
         self, gbuffer: GBuffer, rays: RayBuffer, reusable: Reusable | None, stats: Stats
@@ -133,7 +130,8 @@ class Ldt(RayMethod):
         """Cull the rays of a bounce, and choose how fine the maps must be that they are searched for in."""
         regions = self._culled(gbuffer, rays, bounce, stats)
         if bounce == 0:
-            self.tracer.chosen = self._first_resolutions(gbuffer, rays, regions)
+            if not self.scene.lighting.shadows:  # which have chosen already (``foresee``)
+                self.tracer.chosen = self._resolutions(gbuffer, rays, regions)
             return regions
         # A mesh that is seen in reflections of reflections, too, gets the finest maps that the frame has asked for.
         finest = dict(self.tracer.chosen)
@@ -175,13 +173,6 @@ class Ldt(RayMethod):
             return {}
         footprints = finest_footprints(gbuffer, rays, regions, is_seen=bool(self.scene.lighting.shadows))
         return resolutions_for(self.config.error, self.config.search, self.scene, footprints)
-
-    def _first_resolutions(self, gbuffer: GBuffer, rays: RayBuffer, regions: Regions) -> Mapping[DeviceMesh, int]:
-        """The resolutions that were chosen for this frame's shadows, or else those that its first rays need."""
-        foreseen, self._foreseen = self._foreseen, None
-        if foreseen is not None and foreseen[0] is gbuffer:
-            return foreseen[1]
-        return self._resolutions(gbuffer, rays, regions)
 
     def _culled(self, gbuffer: GBuffer, rays: RayBuffer, bounce: int, stats: Stats) -> Regions:
         """Which objects the rays of a bounce can meet."""
