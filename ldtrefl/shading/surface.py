@@ -84,12 +84,16 @@ def interpolated_normal(
 
 @wp.func
 def part_of(objects: wp.array(dtype=ObjectRecord), index: int, triangle: int) -> int:
-    """The part of an object's mesh that holds a triangle."""
-    part = int(0)
-    for next in range(1, objects[index].part_first.shape[0]):
-        if objects[index].part_first[next] <= triangle:
-            part = next
-    return part
+    """The part of an object's mesh that holds a triangle, by bisection."""
+    low = int(0)
+    high = objects[index].part_first.shape[0]
+    while high - low > 1:
+        middle = (low + high) / 2
+        if objects[index].part_first[middle] <= triangle:
+            low = middle
+        else:
+            high = middle
+    return low
 
 
 @wp.func
