@@ -10,6 +10,7 @@ from ldtrefl.frame.shadows import direct_radiance_of
 from ldtrefl.shading.environment import environment_radiance
 from ldtrefl.shading.specular import mirror_direction
 from ldtrefl.shading.surface import Surface
+from ldtrefl.tracing.nothing import no_shadows
 from ldtrefl.tracing.ray_buffers import RayBuffer, empty_rays
 from ldtrefl.tracing.tracer import BoundTracer, Tracer
 from ldtrefl.world.camera import camera_ray
@@ -104,13 +105,26 @@ def shade_gbuffer(
     gbuffer: GBuffer, shadow: BoundTracer, *, starts_rays: bool, radiance: wp.array | None = None
 ) -> Shaded:
     """Shade every pixel with the shadows that ``shadow`` answers; start the rays of those that see a reflector."""
-    scene, device, pixels = gbuffer.scene, gbuffer.scene.device, gbuffer.reflector_pixels
+    scene, device = gbuffer.scene, gbuffer.scene.device
     if radiance is None or radiance.shape[0] != gbuffer.pixel_count:
         radiance = wp.empty(gbuffer.pixel_count, dtype=wp.vec3, device=device)
     inputs = [gbuffer.view, scene.records, scene.lighting, shadow.views]
     launch.launch(shade_pixels_kernel(shadow.tracer), gbuffer.pixel_count, [*inputs, radiance], device)
+    return _with_reflectors(gbuffer, shadow, radiance, starts_rays=starts_rays)
+
+
+def first_rays(gbuffer: GBuffer) -> RayBuffer:
+    """The rays of the first reflection alone, as :func:`shade_gbuffer` starts them."""
+    device = gbuffer.scene.device
+    radiance = wp.empty(gbuffer.pixel_count, dtype=wp.vec3, device=device)
+    return _with_reflectors(gbuffer, no_shadows(device), radiance, starts_rays=True).rays
+
+
+def _with_reflectors(gbuffer: GBuffer, shadow: BoundTracer, radiance: wp.array, *, starts_rays: bool) -> Shaded:
+    """Shade the pixels that see a reflector, where the others are shaded; start their rays."""
+    scene, device, pixels = gbuffer.scene, gbuffer.scene.device, gbuffer.reflector_pixels
     count = pixels.shape[0]
     mirror, rays = wp.empty(count, dtype=wp.vec3, device=device), empty_rays(count if starts_rays else 0, device)
-    kernel = shade_reflectors_kernel(shadow.tracer, starts_rays)
-    launch.launch(kernel, count, [pixels, *inputs, rays, radiance, mirror], device)
+    inputs = [pixels, gbuffer.view, scene.records, scene.lighting, shadow.views, rays, radiance, mirror]
+    launch.launch(shade_reflectors_kernel(shadow.tracer, starts_rays), count, inputs, device)
     return Shaded(radiance, mirror, rays)

@@ -23,7 +23,7 @@ from pydantic.dataclasses import dataclass
 
 from ldtrefl.device.stats import Stats
 from ldtrefl.frame.bounces import FollowedRays, RayFollower, summed_by_pixel
-from ldtrefl.frame.camera_shading import shade_gbuffer
+from ldtrefl.frame.camera_shading import first_rays
 from ldtrefl.frame.first_hits import FirstHits
 from ldtrefl.frame.flat_regions import flat_regions
 from ldtrefl.frame.footprint import finest_footprints
@@ -45,7 +45,6 @@ from ldtrefl.ldt.options import (
 from ldtrefl.ldt.resolution import resolutions_for
 from ldtrefl.ldt.scene_maps import MapOptions, SceneMaps
 from ldtrefl.methods.base import CONFIG, CommonConfig, RayMethod
-from ldtrefl.tracing.nothing import no_shadows
 from ldtrefl.tracing.ray_buffers import RayBuffer
 from ldtrefl.tracing.tracer import BoundTracer, SceneTracer
 from ldtrefl.world.device_mesh import DeviceMesh
@@ -108,7 +107,7 @@ class Ldt(RayMethod):
         self.tracer.drop_old_maps()
         if self._chooses:
             with stats.stage("cull", self.scene.device):
-                rays = shade_gbuffer(gbuffer, no_shadows(self.scene.device), starts_rays=True).rays
+                rays = first_rays(gbuffer)
                 # Counted when the rays themselves are culled.
                 self.tracer.chosen = self._resolutions(gbuffer, rays, self._culled(gbuffer, rays, 0, Stats()))
 
