@@ -171,7 +171,8 @@ class EnvironmentMap(RayMethod):
             shadow = self.tracer.bound(self.scene, {entry.index for entry in self.scene.objects}, stats)
         eye = reflector.world_from_unit[:3, 3]
         size = max(reflector.longest_side, LEAST_SIZE * float(np.abs(eye).max()))
-        faces = []
+        side = self.config.resolution
+        cube, begin = wp.empty(6 * side * side, dtype=wp.vec3, device=self.scene.device), 0
         with stats.stage("cubemap", self.scene.device):
             for face in range(6):
                 forward = np.zeros(3)
@@ -181,9 +182,11 @@ class EnvironmentMap(RayMethod):
                     look_at=tuple((eye + forward).tolist()),
                     up=(0.0, 1.0, 0.0) if face >= 4 else (0.0, 0.0, 1.0),
                     fov_y=90.0,
-                    width=self.config.resolution,
-                    height=self.config.resolution,
+                    width=side,
+                    height=side,
                 )
                 for seen in draw_in_bands(self.scene, camera, without=reflector.index):
-                    faces.append(shade_gbuffer(seen, shadow, starts_rays=False).radiance.numpy())
-        return wp.array(np.concatenate(faces), dtype=wp.vec3, device=self.scene.device)
+                    band = cube[begin : begin + seen.pixel_count]
+                    shade_gbuffer(seen, shadow, starts_rays=False, radiance=band)
+                    begin += seen.pixel_count
+        return cube
