@@ -28,7 +28,7 @@ from ldtrefl.frame.visibility import BAND_PIXELS, draw_gbuffer, draw_in_bands
 from ldtrefl.methods import find_method
 from ldtrefl.methods.base import RaylessMethod, RayMethod
 from ldtrefl.scene.description import Camera, Scene, Vector
-from ldtrefl.tracing.nothing import no_shadows
+from ldtrefl.tracing.nothing import shadow_tracer
 from ldtrefl.tracing.tracer import BoundTracer
 from ldtrefl.world.device_scene import DeviceScene
 
@@ -209,11 +209,9 @@ class Renderer:
 
     def _shadow_tracer(self, gbuffer: GBuffer, stats: Stats) -> BoundTracer:
         """The tracer that answers the shadow rays of what the camera sees."""
-        scene = gbuffer.scene
-        if not scene.lighting.shadows:
-            return no_shadows(scene.device)
-        self._method.foresee(gbuffer, stats)
-        return self._tracer.bound(scene, {entry.index for entry in scene.objects}, stats)
+        if gbuffer.scene.lighting.shadows:
+            self._method.foresee(gbuffer, stats)
+        return shadow_tracer(self._tracer, gbuffer.scene, stats)
 
     def _composed(self, parts: FrameParts, stats: Stats) -> np.ndarray:
         """(h, w, 3) float32 radiance of a frame or a band."""

@@ -30,7 +30,7 @@ from ldtrefl.frame.visibility import draw_in_bands
 from ldtrefl.geometry.bilinear import bilinear_blend, neighbours_clamped
 from ldtrefl.methods.base import CONFIG, CommonConfig, RayMethod
 from ldtrefl.scene.description import Camera
-from ldtrefl.tracing.nothing import no_shadows
+from ldtrefl.tracing.nothing import shadow_tracer
 from ldtrefl.tracing.ray_buffers import RayBuffer
 from ldtrefl.tracing.tracer import SceneTracer
 from ldtrefl.world.device_object import DeviceObject
@@ -165,10 +165,7 @@ class EnvironmentMap(RayMethod):
 
     def _draw_cube(self, reflector: DeviceObject, stats: Stats) -> wp.array:
         """(6 * resolution^2,) vec3 radiance about the reflector's centre, face by face, row by row."""
-        shadows = self.scene.scene.lighting.shadows
-        shadow = no_shadows(self.scene.device)
-        if shadows:
-            shadow = self.tracer.bound(self.scene, {entry.index for entry in self.scene.objects}, stats)
+        shadow = shadow_tracer(self.tracer, self.scene, stats)
         eye = reflector.world_from_unit[:3, 3]
         size = max(reflector.longest_side, LEAST_SIZE * float(np.abs(eye).max()))
         side = self.config.resolution

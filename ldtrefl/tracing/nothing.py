@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import warp as wp
 
-from ldtrefl.tracing.hit import Hit
-from ldtrefl.tracing.tracer import BoundTracer, Query, Tracer
+from ldtrefl.device.stats import Stats
+from ldtrefl.tracing.hit import Hit, no_hit
+from ldtrefl.tracing.tracer import BoundTracer, Query, SceneTracer, Tracer
+from ldtrefl.world.device_scene import DeviceScene
 
 
 @wp.struct
@@ -19,8 +21,9 @@ class NoView:
 def never_hits(
     views: wp.array(dtype=NoView), index: int, queries: wp.array(dtype=Query), count: int, hits: wp.array(dtype=Hit)
 ):
-    """``closest_hits`` and ``any_hits`` of a tracer that meets nothing: all rays stay misses."""
-    return
+    """``closest_hits`` and ``any_hits`` of a tracer that meets nothing."""
+    for i in range(count):
+        hits[i] = no_hit()
 
 
 @wp.func
@@ -35,3 +38,10 @@ NOTHING = Tracer("nothing", NoView, never_hits, never_hits, never_occluded)
 def no_shadows(device: wp.Device) -> BoundTracer:
     """The tracer ``NOTHING``, ready for kernels."""
     return BoundTracer(NOTHING, wp.empty(0, dtype=NoView, device=device))
+
+
+def shadow_tracer(tracer: SceneTracer, scene: DeviceScene, stats: Stats) -> BoundTracer:
+    """The tracer that answers a scene's shadow rays: ``tracer``, or one that meets nothing if there are no shadows."""
+    if not scene.lighting.shadows:
+        return no_shadows(scene.device)
+    return tracer.bound(scene, {entry.index for entry in scene.objects}, stats)
