@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import warp as wp
 
 from ldtrefl.device import launch
-from ldtrefl.frame.gbuffer import GBuffer, GBufferView, pixel_surface, pixel_view
+from ldtrefl.frame.gbuffer import GBuffer, GBufferView, pixel_ray, pixel_surface, pixel_view
 from ldtrefl.frame.shadows import direct_radiance_of
 from ldtrefl.shading.environment import environment_radiance
 from ldtrefl.shading.specular import mirror_direction
@@ -13,7 +13,6 @@ from ldtrefl.shading.surface import Surface
 from ldtrefl.tracing.nothing import no_shadows
 from ldtrefl.tracing.ray_buffers import RayBuffer, empty_rays
 from ldtrefl.tracing.tracer import BoundTracer, Tracer
-from ldtrefl.world.camera import camera_ray
 from ldtrefl.world.records import LightingRecord, ObjectRecord
 
 
@@ -36,8 +35,7 @@ def shade_pixels_kernel(tracer: Tracer) -> wp.Kernel:
         """Shade one pixel, unless it sees a reflector."""
         i = first + wp.tid()
         if gbuffer.object[i] < 0:
-            x, y = float(i % gbuffer.camera.width) + 0.5, float(i / gbuffer.camera.width) + 0.5
-            radiance_out[i] = environment_radiance(lighting, wp.normalize(camera_ray(gbuffer.camera, x, y)))
+            radiance_out[i] = environment_radiance(lighting, wp.normalize(pixel_ray(gbuffer, i)))
         elif gbuffer.reflector[i] == wp.uint8(0):
             surface = pixel_surface(gbuffer, objects, i, pixel_view(gbuffer, objects, i))
             radiance_out[i] = direct_radiance(views, objects, lighting, surface)
