@@ -14,7 +14,7 @@ from ldtrefl.device import launch
 from ldtrefl.frame.gbuffer import GBuffer, GBufferView
 from ldtrefl.frame.pixel_order import BLOCK
 from ldtrefl.frame.projection import homogeneous
-from ldtrefl.frame.zbuffer import Drawing, object_of
+from ldtrefl.frame.zbuffer import Drawing, empty_corners, object_of, project
 from ldtrefl.geometry.perspective_raster import homogeneous_triangle, perspective_weights
 from ldtrefl.scene.description import Camera
 from ldtrefl.world.camera import Band, camera_view
@@ -76,13 +76,9 @@ def resolved(drawing: Drawing, scene: DeviceScene, camera: Camera) -> GBuffer:
     view.barycentrics = wp.empty(pixels, dtype=wp.vec2, device=device)
     view.reflector = wp.zeros(pixels, dtype=wp.uint8, device=device)
     view.camera = camera_view(camera, scene.device_from_world, drawing.band)
-    if scene.objects:
-        inputs = [drawing.keys, scene.records, drawing.corners, camera.width, drawing.band.first_row]
-        outputs = [view.object, view.triangle, view.barycentrics, view.reflector]
-        launch.launch(resolve_pixels, pixels, [*inputs, *outputs], device)
-    else:
-        view.object.fill_(-1)
-        view.triangle.fill_(-1)
+    inputs = [drawing.keys, scene.records, drawing.corners, camera.width, drawing.band.first_row]
+    outputs = [view.object, view.triangle, view.barycentrics, view.reflector]
+    launch.launch(resolve_pixels, pixels, [*inputs, *outputs], device)
     return GBuffer(scene, camera, view, drawing.band)
 
 
@@ -98,10 +94,10 @@ def draw_in_bands(scene: DeviceScene, camera: Camera, *, without: int = -1) -> I
     everything = [number for number in range(len(scene.objects)) if number != without]
     rows = max(1, BAND_PIXELS // camera.width // BLOCK) * BLOCK
     # The corners are the whole image's, and found once.
-    first = Drawing.empty(scene, camera, Band(0, min(rows, camera.height)))
-    first.project(scene, camera, everything)
+    corners = empty_corners(scene)
+    project(scene, camera, everything, corners)
     for row in range(0, camera.height, rows):
         band = Band(row, min(rows, camera.height - row))
-        drawing = first.of_band(scene, camera, band)
+        drawing = Drawing.empty(scene, camera, band, corners)
         drawing.draw(scene, camera, everything)
         yield resolved(drawing, scene, camera)

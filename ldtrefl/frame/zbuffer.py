@@ -98,6 +98,23 @@ def draw_large_triangles(
     draw_rows(mesh, triangle, box, wp.max(box.first_y, strip), wp.min(box.last_y, strip + STRIP - 1), key_out)
 
 
+def empty_corners(scene: DeviceScene) -> wp.array:
+    """(all objects' vertices,) vec3d, not filled yet."""
+    return wp.empty(scene.vertex_count, dtype=wp.vec3d, device=scene.device)
+
+
+def project(scene: DeviceScene, camera: Camera, numbers: Sequence[int], corners: wp.array) -> None:
+    """Find the corners, in pixels of the whole image, of the objects of these numbers."""
+    entries, device, from_world = [scene.objects[k] for k in numbers], scene.device, pixels_from_world(camera)
+    if not entries:
+        return
+    rows = np.array([from_world @ entry.world_from_unit for entry in entries]).reshape(-1, 4)
+    counts = np.array([entry.vertex_count for entry in entries])
+    chunks, count = chunks_of(np.array(numbers), counts, device)
+    inputs = [chunks, scene.records, wp.array(rows, dtype=wp.vec4d, device=device), corners]
+    launch.launch(project_vertices, count, inputs, device)
+
+
 @dataclass(frozen=True, eq=False)
 class Drawing:
     """A z-buffer of a band, and the corners of what is drawn in it."""
@@ -109,40 +126,23 @@ class Drawing:
     band: Band
 
     @classmethod
-    def empty(cls, scene: DeviceScene, camera: Camera, band: Band | None = None) -> Drawing:
-        """An empty z-buffer of a band, or of the whole image."""
-        corners = wp.empty(scene.vertex_count, dtype=wp.vec3d, device=scene.device)
-        return cls._blank(scene, camera, band or whole_image(camera), corners)
-
-    @classmethod
-    def _blank(cls, scene: DeviceScene, camera: Camera, band: Band, corners: wp.array) -> Drawing:
+    def empty(
+        cls, scene: DeviceScene, camera: Camera, band: Band | None = None, corners: wp.array | None = None
+    ) -> Drawing:
+        """An empty z-buffer of a band, or of the whole image; with corners that are known, or with room for them."""
+        band = band or whole_image(camera)
         keys = wp.zeros(camera.width * band.rows, dtype=wp.int64, device=scene.device)
-        return cls(keys, corners, band)
+        return cls(keys, empty_corners(scene) if corners is None else corners, band)
 
     def over(self) -> Drawing:
         """A copy to draw other objects over."""
         return Drawing(wp.clone(self.keys), self.corners, self.band)
 
-    def of_band(self, scene: DeviceScene, camera: Camera, band: Band) -> Drawing:
-        """An empty z-buffer of another band, with the same corners."""
-        return self._blank(scene, camera, band, self.corners)
-
     def add(self, scene: DeviceScene, camera: Camera, numbers: Iterable[int]) -> None:
         """Draw the objects of these numbers."""
         listed = list(numbers)
-        self.project(scene, camera, listed)
+        project(scene, camera, listed, self.corners)
         self.draw(scene, camera, listed)
-
-    def project(self, scene: DeviceScene, camera: Camera, numbers: Sequence[int]) -> None:
-        """Find the corners of the objects of these numbers."""
-        entries, device, from_world = [scene.objects[k] for k in numbers], scene.device, pixels_from_world(camera)
-        if not entries:
-            return
-        rows = np.array([from_world @ entry.world_from_unit for entry in entries]).reshape(-1, 4)
-        counts = np.array([entry.vertex_count for entry in entries])
-        chunks, count = chunks_of(np.array(numbers), counts, device)
-        inputs = [chunks, scene.records, wp.array(rows, dtype=wp.vec4d, device=device), self.corners]
-        launch.launch(project_vertices, count, inputs, device)
 
     def draw(self, scene: DeviceScene, camera: Camera, numbers: Sequence[int]) -> None:
         """Draw the objects of these numbers, whose corners are known."""
