@@ -8,9 +8,12 @@ The result depends on this frame alone: neither on earlier frames nor on the opt
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ldtrefl.frame.gbuffer import GBuffer
+from ldtrefl.frame.pixel_order import BLOCK
 from ldtrefl.frame.regions import Regions
 from ldtrefl.tracing.object_sets import rays_of, run_count
 from ldtrefl.tracing.ray_buffers import RayBuffer, distance_across
@@ -30,16 +33,30 @@ SURELY = 0.9999
 sphere, has surely kept that ray."""
 
 
-def footprint(rays: RayBuffer, width: int, runs: np.ndarray, entry: DeviceObject) -> float | None:
+@dataclass(frozen=True, eq=False)
+class RayArrays:
+    """Rays of one bounce, as NumPy arrays; see ``RayBuffer``."""
+
+    pixel: np.ndarray
+    source: np.ndarray
+    origin: np.ndarray
+    direction: np.ndarray
+
+    @classmethod
+    def of(cls, rays: RayBuffer) -> RayArrays:
+        """The arrays of a buffer."""
+        return cls(rays.pixel.numpy(), rays.source.numpy(), rays.origin.numpy(), rays.direction.numpy())
+
+
+def footprint(rays: RayArrays, width: int, runs: np.ndarray, entry: DeviceObject) -> float | None:
     """Distance between neighbouring pixels' rays at an object, device units; None if no two neighbours meet its sphere.
 
     Args:
-        rays: the rays of one bounce.
+        rays: all rays of one bounce.
         width: pixels in a row of the image.
         runs: (m,) numbers of the runs of rays that may meet the object.
     """
-    pixel, source = rays.pixel.numpy(), rays.source.numpy()
-    origin, direction = rays.origin.numpy(), rays.direction.numpy()
+    pixel, source, origin, direction = rays.pixel, rays.source, rays.origin, rays.direction
     numbers = rays_of(runs, len(pixel))
     # The choice of rays must not depend on which runs are left out.
     numbers = numbers[numbers % max(1, len(pixel) // CANDIDATES) == 0]
@@ -47,13 +64,13 @@ def footprint(rays: RayBuffer, width: int, runs: np.ndarray, entry: DeviceObject
     offset = np.array(entry.record.centre, float) - origin[numbers]
     along = (offset * direction[numbers]).sum(axis=1)
     meets = (along > 0.0) & ((offset**2).sum(axis=1) - along**2 <= (SURELY * float(entry.record.radius)) ** 2)
-    numbers = numbers[meets]
-    numbers = numbers[:: max(1, len(numbers) // SAMPLES)]
-    o, d = origin[numbers].astype(float), direction[numbers].astype(float)
-    along = ((np.array(entry.record.centre, float) - o) * d).sum(axis=1)
+    chosen = np.flatnonzero(meets)
+    chosen = chosen[:: max(1, len(chosen) // SAMPLES)]
+    numbers, along = numbers[chosen], along[chosen]
+    o, d = origin[numbers], direction[numbers].astype(float)
     apart = np.full((2, len(numbers)), np.nan)
-    # In a block of 8 x 8 pixels the next ray is the pixel to the right, the eighth the one below.
-    for row, (step, to_pixel) in zip(apart, ((1, 1), (8, width)), strict=True):
+    # In a block of pixels the next ray is that of the pixel to the right; a row of the block on, that of the one below.
+    for row, (step, to_pixel) in zip(apart, ((1, 1), (BLOCK, width)), strict=True):
         beside = np.minimum(numbers + step, len(pixel) - 1)
         pair = (pixel[beside] == pixel[numbers] + to_pixel) & (source[beside] == source[numbers])
         row[pair] = distance_across(o, d, origin[beside], direction[beside], along)[pair]
@@ -86,6 +103,7 @@ def finest_footprints(gbuffer: GBuffer, rays: RayBuffer, regions: Regions, *, is
     by_runs = len(bits) > 0 and regions.sets.rows.shape[0] == 0
     every_run = np.arange(run_count(rays.pixel.shape[0]))
     spacing = pixel_spacing(gbuffer) if is_seen else None
+    arrays = RayArrays.of(rays)
     finest: dict[int, float | None] = {}
     for entry in gbuffer.scene.objects:
         is_shown = entry.index in regions.shown
@@ -94,6 +112,6 @@ def finest_footprints(gbuffer: GBuffer, rays: RayBuffer, regions: Regions, *, is
         apart = [spacing]
         if is_shown:
             runs = np.flatnonzero(bits[:, entry.index // 32] >> entry.index % 32 & 1) if by_runs else every_run
-            apart.append(footprint(rays, gbuffer.camera.width, runs, entry))
+            apart.append(footprint(arrays, gbuffer.camera.width, runs, entry))
         finest[entry.index] = min((distance for distance in apart if distance is not None), default=None)
     return finest

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ldtrefl.device.stats import Stats
-from ldtrefl.frame.footprint import finest_footprints, footprint, pixel_spacing
+from ldtrefl.frame.footprint import RayArrays, finest_footprints, footprint, pixel_spacing
 from ldtrefl.frame.regions import all_objects, safe_regions
 from ldtrefl.scene.description import Camera, Material, Object, Scene
 from ldtrefl.tracing.object_sets import run_count
@@ -43,7 +43,7 @@ def test_neighbouring_rays_are_as_far_apart_as_geometry_says(given: Scene, expec
     scene = flat_mirror.on_device(given)
     gbuffer, shaded = flat_mirror.seen_and_shaded(scene)
     ball, runs = scene.objects[1], np.arange(run_count(shaded.rays.pixel.shape[0]))
-    found = footprint(shaded.rays, SIDE, runs, ball)
+    found = footprint(RayArrays.of(shaded.rays), SIDE, runs, ball)
     assert found is not None
     assert found / scene.device_units_per_world_unit == pytest.approx(expected, rel=0.01)
     regions = safe_regions(gbuffer, shaded.rays, 0, Stats())
