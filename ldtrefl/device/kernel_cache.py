@@ -42,7 +42,6 @@ class _State:
         self.is_announced = False  # whether the notice, or a warning in its place, was given
         self.is_checked = False  # whether Warp's own folder has been found good or bad
         self.own_folder: Path | None = None  # where kernels go if Warp's folder is bad
-        self.own_process = 0  # the process that made the folder and removes it
         self.log_level: int | None = None  # Warp's level while it is kept quiet
 
 
@@ -191,8 +190,8 @@ def _compile_elsewhere(folder: str, reason: str) -> None:
             f"compiled kernels cannot be kept in {folder} ({reason}), nor in a temporary folder ({_reason(error)}); "
             f"set WARP_CACHE_PATH to a folder with {ROOM_BYTES >> 20} MB of room"
         ) from error
-    _state.own_folder, _state.own_process = made, os.getpid()
-    atexit.register(_remove, made, _state.own_process)
+    _state.own_folder = made
+    atexit.register(_remove, made, os.getpid())
     _state.is_announced = True
     _log.warning(
         f"the kernel cache {folder} cannot be used ({reason}): kernels are compiled for this run alone, which takes up "

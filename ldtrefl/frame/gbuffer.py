@@ -142,11 +142,6 @@ class GBuffer:
         return self.band.rows, self.camera.width
 
     @property
-    def is_whole(self) -> bool:
-        """Whether the band is the whole image."""
-        return self.band.rows == self.camera.height
-
-    @property
     def pixel_count(self) -> int:
         """Pixels of the band."""
         return self.band.rows * self.camera.width

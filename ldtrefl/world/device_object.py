@@ -81,7 +81,7 @@ def set_geometry(
     normal_from_unit = inverse[:3, :3].T / np.abs(inverse[:3, :3]).max()
     record.normal_from_unit = wp.mat33(normal_from_unit.astype(np.float32))
     record.centre, record.radius = bounding_sphere(geometry.mesh, device_from_unit)
-    record.first_triangle, record.triangle_count = first_triangle, len(geometry.mesh.faces)
+    record.first_triangle = first_triangle
     record.first_vertex = first_vertex
 
 

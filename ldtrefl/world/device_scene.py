@@ -50,7 +50,7 @@ class DeviceScene:
         self._decoded = wp.array(linear_of_bytes(), dtype=float, device=device, copy=False)
         self.device_from_world = device_space(scene.layout_box)
         meshes = self._device_meshes(before)
-        self.triangle_count, self.vertex_count = _counts(meshes)
+        self.vertex_count = _counted_vertices(meshes)
         self.objects = self._placed_objects(meshes, before)
         self.records = wp.array([entry.record for entry in self.objects], dtype=ObjectRecord, device=device)
         same_picture = before is not None and before.scene.environment is scene.environment
@@ -118,11 +118,11 @@ class DeviceScene:
         self.lighting.up = wp.vec3(*unit_up(camera))
 
 
-def _counts(meshes: list[DeviceMesh]) -> tuple[int, int]:
-    """(triangles, vertices) of all objects, given the mesh of each.
+def _counted_vertices(meshes: list[DeviceMesh]) -> int:
+    """Vertices of all objects, given the mesh of each.
 
     Raises:
-        InputError: they are more than can be numbered.
+        InputError: they, or the triangles, are more than can be numbered.
     """
     triangles = vertices = 0
     for entry in meshes:
@@ -131,4 +131,4 @@ def _counts(meshes: list[DeviceMesh]) -> tuple[int, int]:
         for count, what in ((triangles, "triangles"), (vertices, "vertices")):
             if count > MOST_NUMBERS:
                 raise InputError(f"the objects have more than {MOST_NUMBERS} {what}, instances counted in")
-    return triangles, vertices
+    return vertices

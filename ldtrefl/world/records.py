@@ -29,7 +29,6 @@ class ObjectRecord:
     radius: float  # of that sphere, device units
     first_triangle: int  # number of triangle 0 among all objects' triangles
     first_vertex: int  # number of vertex 0 among all objects' vertices
-    triangle_count: int
     smooth: int  # 1 for interpolated shading normals, 0 for the facets'
     fresnel: int  # 1 for Schlick's approximation
     albedo: wp.vec3

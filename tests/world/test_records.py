@@ -15,7 +15,7 @@ from ldtrefl.world.records import ObjectRecord
 def read_records(first: int, objects: wp.array(dtype=ObjectRecord), out: wp.array(dtype=float)):
     """Add up some fields of one record."""
     i = first + wp.tid()
-    last = objects[i].vertices[objects[i].triangle_count]
+    last = objects[i].vertices[objects[i].first_triangle]
     out[i] = objects[i].radius + last[2] + float(objects[i].unit_from_device[1, 3])
 
 
@@ -25,7 +25,7 @@ def test_kernels_read_what_was_written() -> None:
     for k in range(3):
         record = ObjectRecord()
         record.vertices = wp.array(np.full((4, 3), 10.0 * k, np.float32), dtype=wp.vec3, device=cpu)
-        record.triangle_count, record.radius = k, float(k)
+        record.first_triangle, record.radius = k, float(k)
         matrix = np.eye(4)
         matrix[1, 3] = 100.0 * k
         record.unit_from_device = wp.mat44d(matrix)
@@ -36,6 +36,6 @@ def test_kernels_read_what_was_written() -> None:
 
 
 def test_every_field_whose_name_does_not_say_all_has_a_comment() -> None:
-    plain = {"faces", "triangle_count", "albedo", "unit_from_device", "device_from_unit", "lights"}
+    plain = {"faces", "albedo", "unit_from_device", "device_from_unit", "lights"}
     fields = re.findall(r"^    (\w+): .*?(#.*)?$", Path(records.__file__).read_text(), re.M)
     assert {name for name, comment in fields if not comment} == plain
