@@ -125,9 +125,9 @@ class ThreadTeam:
         inputs = [ctypes.addressof(self._board), job, thread, LOOKS_BEFORE_SLEEP]
         return wp.launch(work_on_board, dim=1, inputs=inputs, device=cpu, record_cmd=True)
 
-    def prepare(self, kernel: wp.Kernel, count: int, arguments: Sequence[object], cpu: wp.Device) -> RangeLaunch:
-        """Make ``kernel(first, *arguments)`` ready to be run by the team for ranges of ``count`` items."""
-        command = record_launch(kernel, count, arguments, cpu)
+    def prepare(self, kernel: wp.Kernel, arguments: Sequence[object], cpu: wp.Device) -> RangeLaunch:
+        """Make ``kernel(first, *arguments)`` ready to be run by the team for ranges of items."""
+        command = record_launch(kernel, arguments, cpu)
         call = self._calls.get(kernel)
         if call is None or not call.is_for(command):
             call = self._calls[kernel] = warp_abi.NativeCall(command)

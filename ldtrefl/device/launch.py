@@ -145,9 +145,9 @@ def launch(kernel: wp.Kernel, count: int, arguments: Sequence[object], device: w
         wp.launch(kernel, dim=count, inputs=[0, *arguments], device=device)
         return
     if _state.threads == 1:
-        run = on_this_thread(record_launch(kernel, count, arguments, device))
+        run = on_this_thread(record_launch(kernel, arguments, device))
     else:
-        run = _team().prepare(kernel, count, arguments, device)
+        run = _team().prepare(kernel, arguments, device)
     reports = min(count, REPORTS) if progress.is_watched() else 1
     for k in range(reports):
         first, end = (count * part // reports for part in (k, k + 1))

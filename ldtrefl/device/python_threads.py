@@ -66,8 +66,8 @@ class PythonThreads:
         self._threads = threads
         self._helpers = ThreadPoolExecutor(max(1, threads - 1), thread_name_prefix="ldtrefl")
 
-    def prepare(self, kernel: wp.Kernel, count: int, arguments: Sequence[object], cpu: wp.Device) -> RangeLaunch:
-        """Make ``kernel(first, *arguments)`` ready to be run by the threads for ranges of ``count`` items."""
+    def prepare(self, kernel: wp.Kernel, arguments: Sequence[object], cpu: wp.Device) -> RangeLaunch:
+        """Make ``kernel(first, *arguments)`` ready to be run by the threads for ranges of items."""
         kernel_cache.load(kernel, cpu)
 
         def run_slice(begin: int, end: int) -> None:

@@ -12,14 +12,14 @@ RangeLaunch = Callable[[int, int], None]
 """Runs a kernel for a range of items: the number of the first one, and how many. Returns when all are done."""
 
 
-def record_launch(kernel: wp.Kernel, count: int, arguments: Sequence[object], cpu: wp.Device) -> wp.Launch:
-    """Record the launch of ``kernel(first, *arguments)`` for ``count`` items on the CPU; the kernel is loaded.
+def record_launch(kernel: wp.Kernel, arguments: Sequence[object], cpu: wp.Device) -> wp.Launch:
+    """Record a launch of ``kernel(first, *arguments)`` on the CPU, for one item; the kernel is loaded.
 
     Raises:
         InputError: the kernel must be compiled, and no folder can be written.
     """
     kernel_cache.load(kernel, cpu)
-    return wp.launch(kernel, dim=count, inputs=[0, *arguments], device=cpu, record_cmd=True)
+    return wp.launch(kernel, dim=1, inputs=[0, *arguments], device=cpu, record_cmd=True)
 
 
 def on_this_thread(command: wp.Launch) -> RangeLaunch:

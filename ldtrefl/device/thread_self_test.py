@@ -76,13 +76,13 @@ def _try_native_threads() -> str | None:
     given.flag, given.offset, given.scale = wp.uint8(3), wp.float64(0.5), wp.vec3(1.0, 2.0, 4.0)
     given.values = wp.array(np.arange(ITEMS, dtype=np.float32), dtype=float, device=cpu)
     expected, found = (wp.zeros(ITEMS, dtype=float, device=cpu) for _ in range(2))
-    command = record_launch(add_mixed_arguments, ITEMS, [given, found], cpu)
+    command = record_launch(add_mixed_arguments, [given, found], cpu)
     unknown = warp_abi.unknown_layout(command, kernel_cache.folders())
     if unknown is not None:
         return unknown
     team = ThreadTeam(2)
     try:
-        run = team.prepare(add_mixed_arguments, ITEMS, [given, found], cpu)
+        run = team.prepare(add_mixed_arguments, [given, found], cpu)
         for first, items in ((0, ITEMS - 1), (1, 2 * SLICES_PER_THREAD), (ITEMS // 2, 5)):
             run(first, items)
             inputs = [first, given, expected]

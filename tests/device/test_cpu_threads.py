@@ -57,7 +57,7 @@ def test_a_team_that_has_ended_launches_on_one_thread() -> None:
     device = launch.resolve_device(None)
     team = ThreadTeam(2)
     numbers = wp.zeros(1000, dtype=int, device=device)
-    run = team.prepare(add_number, 1000, [numbers], device)
+    run = team.prepare(add_number, [numbers], device)
     helpers = threading.active_count()
     team.end()
     assert threading.active_count() == helpers - 1

@@ -45,6 +45,6 @@ def test_an_unknown_warp_gives_the_same_bits(
 
 def test_what_a_slice_raises_is_raised() -> None:
     launch.resolve_device(None)
-    run = PythonThreads(2).prepare(add_number, 100, ["not an array"], wp.get_device("cpu"))
+    run = PythonThreads(2).prepare(add_number, ["not an array"], wp.get_device("cpu"))
     with pytest.raises(Exception, match="array"):
         run(0, 100)

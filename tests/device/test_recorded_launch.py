@@ -14,7 +14,7 @@ def test_ranges_of_a_recorded_launch() -> None:
     device = launch.resolve_device(None)
     numbers = wp.zeros(10, dtype=int, device=device)
     threads = threading.active_count()
-    run = on_this_thread(record_launch(add_number, 10, [numbers], device))
+    run = on_this_thread(record_launch(add_number, [numbers], device))
     assert not numbers.numpy().any(), "recorded, not made"
     run(2, 3)
     run(7, 1)

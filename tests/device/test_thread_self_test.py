@@ -29,7 +29,7 @@ def test_it_runs_once(not_self_tested: None, monkeypatch: pytest.MonkeyPatch) ->
 
 def test_a_wrong_call_is_found_out(not_self_tested: None, monkeypatch: pytest.MonkeyPatch) -> None:
     device = launch.resolve_device(None)
-    wrong = record_launch(add_one, 1, [MixedArguments(), wp.zeros(1, dtype=float, device=device)], device)
+    wrong = record_launch(add_one, [MixedArguments(), wp.zeros(1, dtype=float, device=device)], device)
     address = warp_abi.entry_point(wrong)
     monkeypatch.setattr(warp_abi, "entry_point", lambda command: address)
     assert "other values" in str(why_not_native())

@@ -29,7 +29,7 @@ def with_another(command: Any, **replaced: Any) -> Any:
 
 def test_unknown_layouts_are_not_called(tmp_path: Path) -> None:
     device = launch.resolve_device(None)
-    command = record_launch(add_number, 10, [wp.zeros(10, dtype=int, device=device)], device)
+    command = record_launch(add_number, [wp.zeros(10, dtype=int, device=device)], device)
     folders = kernel_cache.folders()
     assert warp_abi.unknown_layout(command, folders) is None
     bounds, *arguments = command.params
