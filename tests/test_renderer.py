@@ -87,7 +87,7 @@ def stopping_at(monkeypatch: pytest.MonkeyPatch, launches: int) -> Callable[[], 
     return monkeypatch.undo
 
 
-@pytest.mark.parametrize("launches", range(0, 16, 3))
+@pytest.mark.parametrize("launches", range(0, 13, 3))  # of the 13 that the frame needs
 def test_a_frame_that_is_stopped_leaves_nothing_half_done(launches: int, monkeypatch: pytest.MonkeyPatch) -> None:
     renderer = ldtrefl.Renderer(scene(), "ldt", error=1.0)
     renderer.render()
@@ -95,10 +95,8 @@ def test_a_frame_that_is_stopped_leaves_nothing_half_done(launches: int, monkeyp
     renderer.render()
     renderer.move("knot", translate=(1.2, -1.3, 0.1))
     go_on = stopping_at(monkeypatch, launches)
-    try:
+    with pytest.raises(Stop):
         renderer.render()
-    except Stop:
-        pass
     go_on()
     # What moved before the frame that was stopped, and what moves now.
     assert_as_fresh(renderer, renderer.render(), error=1.0)
