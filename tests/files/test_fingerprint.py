@@ -53,6 +53,7 @@ def test_the_source_is_part_of_the_key(tmp_path: Path) -> None:
 
     def key_after(changed_file: str | None) -> str:
         if changed_file is not None:
+            assert (copied / changed_file).is_file()
             with (copied / changed_file).open("a") as file:
                 file.write("\n")
         spec = importlib.util.spec_from_file_location("ldtrefl.files.fingerprint", copied / "files" / "fingerprint.py")
@@ -64,4 +65,4 @@ def test_the_source_is_part_of_the_key(tmp_path: Path) -> None:
     changed = ("ldt/exact/walk.h", "device/vectors.h", "ldt/exact/patches.py", "device/bins.py", "ldt/texture.py")
     keys = [key_after(name) for name in (None, *changed)]
     assert len(set(keys)) == len(keys) and keys[0] == fingerprint("ldt.texture")
-    assert key_after("cli/commands.py") == keys[-1]
+    assert key_after("cli/program.py") == keys[-1]
