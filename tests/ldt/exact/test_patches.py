@@ -23,6 +23,7 @@ def survey() -> Survey:
 
 
 def test_patches_lie_on_the_sphere_and_face_its_maps(survey: Survey) -> None:
+    assert survey.count > 0
     patches, texel = (array.numpy() for array in survey.patches())
     per_unit = survey.cells_per_texel * survey.frame.scale
     centre = np.array(survey.frame.offset) * survey.cells_per_texel
@@ -38,6 +39,7 @@ def test_patches_lie_on_the_sphere_and_face_its_maps(survey: Survey) -> None:
 
 
 def test_a_patch_is_its_texel_and_the_margin(survey: Survey) -> None:
+    assert survey.count > 0
     patches, texel = (array.numpy() for array in survey.patches())
     side = (1.0 + 2.0 * float(PATCH_MARGIN)) * survey.cells_per_texel
     for axis in range(3):
@@ -50,3 +52,22 @@ def test_a_patch_is_its_texel_and_the_margin(survey: Survey) -> None:
         middle = (patches["corner"] + 0.5 * (patches["edge_u"] + patches["edge_v"]))[own] / survey.cells_per_texel
         np.testing.assert_allclose(middle[:, u], number % columns + 0.5, atol=1e-4)
         np.testing.assert_allclose(middle[:, v], number // columns + 0.5, atol=1e-4)
+
+
+def test_patches_leave_nothing_of_the_sphere_open(survey: Survey) -> None:
+    """A point lies in a texel that has a patch, on the point's side, in the map of the axis that it faces most."""
+    patches, texel = (array.numpy() for array in survey.patches())
+    points = np.random.default_rng(0).normal(size=(20_000, 3))
+    points /= np.linalg.norm(points, axis=1, keepdims=True)
+    axis = np.abs(points).argmax(axis=1)
+    row = np.arange(len(points))
+    at = points * survey.frame.scale + survey.frame.offset
+    u, v = (np.floor(at[row, (axis + k) % 3]).astype(int) for k in (1, 2))
+    wanted = np.array(survey.frame.first_texels)[axis] + v * RESOLUTION + u
+
+    own = patches["kind"] % int(LARGE)
+    middle = patches["corner"] + 0.5 * (patches["edge_u"] + patches["edge_v"])
+    is_high = middle[np.arange(len(own)), own] > np.array(survey.frame.offset)[own] * survey.cells_per_texel
+    there = set(zip(texel.tolist(), is_high.tolist(), strict=True))
+    is_open = [place not in there for place in zip(wanted.tolist(), (points[row, axis] > 0).tolist(), strict=True)]
+    assert not any(is_open), f"{sum(is_open)} of {len(points)} points have no patch"
