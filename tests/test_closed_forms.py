@@ -131,7 +131,7 @@ def test_facing_mirrors_bounce(method: str) -> None:
     )
     # Front mirror, back mirror, past the front mirror to the glow.
     np.testing.assert_allclose(ldtrefl.render(scene, method, max_bounces=1).image, 0.0, atol=1e-6)
-    np.testing.assert_allclose(ldtrefl.render(scene, method, max_bounces=2).image, 0.25, atol=1e-3)
+    np.testing.assert_allclose(ldtrefl.render(scene, method, max_bounces=2).image, 0.25, rtol=1e-6)
 
 
 @pytest.mark.parametrize("method", ["bvh", "ldt", "envmap"])

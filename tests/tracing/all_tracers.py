@@ -4,6 +4,10 @@ import numpy as np
 
 import ldtrefl
 
+NEAR = 1e-4
+"""How far from the face of a box of side 2 a tracer may find it. The paper's search halves a step of a texel, 2 / 256,
+eight times, to 3e-5; the others find it to float32's rounding."""
+
 
 class LinearMaps:
     """A layered depth texture traced by the paper's search."""

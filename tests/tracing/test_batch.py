@@ -7,7 +7,7 @@ from stress_cases.inputs import rays_about
 
 import ldtrefl
 from ldtrefl.scene import shapes
-from tests.tracing.all_tracers import all_tracers
+from tests.tracing.all_tracers import NEAR, all_tracers
 
 
 def test_direction_length_scales_t() -> None:
@@ -26,7 +26,7 @@ def test_rays_that_are_none_miss_and_are_counted() -> None:
     for tracer in all_tracers(shapes.make("box")):
         hits = tracer.trace(origins, odd)
         assert np.isposinf(hits.t[:3]).all() and (hits.triangle[:3] == -1).all()
-        assert hits.t[3] == pytest.approx(4.0, abs=1e-3)
+        assert hits.t[3] == pytest.approx(4.0, abs=NEAR)
         assert hits.invalid == 3
         nowhere = tracer.trace(np.full((1, 3), np.nan, np.float32), odd[3:])
         assert nowhere.triangle[0] == -1 and nowhere.invalid == 1

@@ -5,7 +5,7 @@ import pytest
 from stress_cases.inputs import rays_about
 
 from ldtrefl.scene import shapes
-from tests.tracing.all_tracers import all_tracers
+from tests.tracing.all_tracers import NEAR, all_tracers
 
 
 def test_axis_parallel_rays_with_either_zero() -> None:
@@ -19,7 +19,7 @@ def test_axis_parallel_rays_with_either_zero() -> None:
                     origin = np.full(3, 0.3, np.float32)
                     origin[axis] = -4 * sign
                     hits = tracer.trace(origin[None], direction[None])
-                    assert hits.t[0] == pytest.approx(3.0, abs=1e-3)
+                    assert hits.t[0] == pytest.approx(3.0, abs=NEAR)
 
 
 def test_from_within_a_room_every_ray_hits_a_wall() -> None:
