@@ -13,6 +13,7 @@ def test_positions_and_normals() -> None:
     device_scene = flat_mirror.on_device(Scene(camera=camera, objects=(Object(shape="sphere"),)))
     seen = draw_gbuffer(device_scene, camera)
     position, normal = (x.numpy().reshape(80, 120, 3)[seen.objects >= 0] for x in seen.surfaces)
+    assert len(position) > 3000
     np.testing.assert_allclose(np.linalg.norm(position, axis=1), 1.0, atol=2e-3)
     np.testing.assert_allclose(normal, position, atol=5e-3)
 

@@ -53,6 +53,7 @@ def test_depths_agree_with_the_triangles() -> None:
         u, v = (axis + 1) % 3, (axis + 2) % 3
         offset = (texel % columns + 0.5 - a[:, u]) * normal[:, u] + (texel // columns + 0.5 - a[:, v]) * normal[:, v]
         facing = np.abs(normal[:, axis]) > 0.3 * np.linalg.norm(normal, axis=1)
+        assert facing.any()
         expected = a[:, axis] - offset / np.where(facing, normal[:, axis], 1.0)
         np.testing.assert_allclose(depth[span][facing], expected[facing], atol=2e-3)
         assert ((reference[span] & 1) == (normal[:, axis] > 0)).all()

@@ -32,6 +32,7 @@ def test_nodes_hold_the_boxes_of_their_children() -> None:
     nodes = view.nodes.numpy().reshape(-1, int(NODE))
     sides, children = nodes[:, : 6 * lanes].reshape(-1, 3, 2, lanes), nodes[:, 6 * lanes :].view(np.int32)
     is_empty = sides[:, 0, 0] > sides[:, 0, 1]
+    assert ((children > 0) & ~is_empty).any()
     for number in range(len(nodes)):
         for lane in np.flatnonzero((children[number] > 0) & ~is_empty[number]):
             child = sides[children[number, lane]]
