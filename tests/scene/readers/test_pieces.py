@@ -89,10 +89,9 @@ def test_normals_that_are_none_are_undefined(tmp_path: Path) -> None:
 
 
 def test_loops_of_nodes_end(tmp_path: Path) -> None:
+    """glTF allows none. Each node's box is there whole."""
     positions, normals, order = soft_box()
     nodes = [{"mesh": 0, "children": [1]}, {"mesh": 0, "children": [0]}]
     path = write_glb(tmp_path / "a.glb", [positions, normals, order], meshes=MESH, nodes=nodes, scenes=SCENE)
-    try:
-        assert len(ldtrefl.load_mesh(path).faces) % 12 == 0
-    except ldtrefl.InputError:
-        pass
+    faces = len(ldtrefl.load_mesh(path).faces)
+    assert faces >= 2 * 12 and faces % 12 == 0
