@@ -37,7 +37,8 @@ def bowl(
         turn = np.linspace(0.0, np.pi, 9)[1:-1, None]
         rim = out * (1.0 + thickness / 2) + thickness / 2 * (np.cos(turn) * out + np.sin(turn) * up)
         profile = np.concatenate([inner * (1.0 + thickness), rim, profile])
-    return fitted(revolved(profile, around))
+    mesh = revolved(profile, around)
+    return fitted(mesh.with_normals(mesh.normals))
 
 
 def _rows(closed: bool, segments: int) -> int:

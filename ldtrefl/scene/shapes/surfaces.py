@@ -104,9 +104,9 @@ def joined(*meshes: Mesh) -> Mesh:
 
 
 def fitted(mesh: Mesh) -> Mesh:
-    """The mesh moved and scaled so that its longest side runs from -1 to 1."""
+    """The mesh moved and scaled so that its longest side runs from -1 to 1. Normals are kept, and not made."""
     centre, half = mesh.unit_frame
-    return Mesh((mesh.vertices - centre) / half, mesh.faces, mesh.normals, mesh.uvs)
+    return Mesh((mesh.vertices - centre) / half, mesh.faces, mesh.stored_normals, mesh.uvs)
 
 
 def outwards(mesh: Mesh) -> Mesh:

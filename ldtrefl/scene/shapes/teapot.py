@@ -44,4 +44,5 @@ def teapot(segments: Segments = 16) -> Mesh:
     for patch in TWOFOLD:
         for mirror in ((1, 1), (1, -1)):
             add(patch, mirror)
-    return fitted(Mesh(np.concatenate(vertices), np.concatenate(faces), None, np.concatenate(uvs)))
+    mesh = Mesh(np.concatenate(vertices), np.concatenate(faces), None, np.concatenate(uvs))
+    return fitted(mesh.with_normals(mesh.normals))
