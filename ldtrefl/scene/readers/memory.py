@@ -11,8 +11,6 @@ import zipfile
 from io import BytesIO
 from typing import Any
 
-from ldtrefl.scene.readers.polygon_files import has_polygons
-
 BYTES_PER_VERTEX = 160.0
 """A vertex while pieces are joined, welded and smoothed, the mesh itself included."""
 
@@ -45,12 +43,13 @@ COMPONENT_BYTES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
 COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 
 
-def reading_bytes(data: bytes, kind: str) -> float:
+def reading_bytes(data: bytes, kind: str, *, polygons: bool) -> float:
     """Bytes that it takes to read a mesh file, besides the file itself, which is in ``data``.
 
     Args:
         data: the file.
         kind: how its name ends, such as 'obj' or 'glb'.
+        polygons: it may hold polygons of more than three corners.
     """
     if kind in ("glb", "gltf"):
         return _gltf_bytes(data, kind)
@@ -59,9 +58,9 @@ def reading_bytes(data: bytes, kind: str) -> float:
             return OTHER * sum(entry.file_size for entry in archive.infolist())
     is_text = kind in ("obj", "off") or (kind == "ply" and b"ascii" in data[:64])
     if is_text:
-        figures = BYTES_PER_WORD_WITH_POLYGONS if has_polygons(data, kind) else BYTES_PER_WORD
+        figures = BYTES_PER_WORD_WITH_POLYGONS if polygons else BYTES_PER_WORD
         return TEXT * len(data) + figures[kind] * sum(data.count(end) for end in (b" ", b"\n", b"/", b"\t"))
-    if kind == "ply" and has_polygons(data, kind):
+    if kind == "ply" and polygons:
         return BINARY_WITH_POLYGONS * len(data)
     if kind == "stl" and data[:5].lower() == b"solid":
         return 2.0 * BINARY["stl"] * len(data)

@@ -25,6 +25,7 @@ from ldtrefl.scene.readers.archives import ARCHIVES, archive_kind, mesh_files
 from ldtrefl.scene.readers.joining import distinct_materials, joined_mesh, joining_bytes
 from ldtrefl.scene.readers.memory import reading_bytes
 from ldtrefl.scene.readers.pieces import Piece, pieces_of
+from ldtrefl.scene.readers.polygon_files import has_polygons
 from ldtrefl.scene.readers.trimesh_warnings import trimesh_warnings
 
 _log = logging.getLogger("ldtrefl")
@@ -86,11 +87,12 @@ def _read_pieces(path: str) -> tuple[list[Piece], float]:
     pieces: list[Piece] = []
     taken = 0.0
     for data, kind, beside in mesh_files(path):
-        needed = reading_bytes(data, kind)
+        polygons = has_polygons(data, kind)
+        needed = reading_bytes(data, kind, polygons=polygons)
         budget.take(needed, f"reading it as {kind}")
         taken += needed
         with trimesh_warnings() as warnings:
-            pieces += pieces_of(data, kind, beside)
+            pieces += pieces_of(data, kind, beside, polygons=polygons)
         if warnings and kind.startswith("stl"):
             raise InputError(f"not a mesh that can be read ({warnings[0]})")
         for line in warnings:

@@ -18,7 +18,7 @@ from trimesh.resolvers import Resolver
 
 from ldtrefl.scene.mesh import Mesh
 from ldtrefl.scene.readers.ply_polygons import CORNER_LIST, FACES
-from ldtrefl.scene.readers.polygon_files import has_polygons, in_triangles
+from ldtrefl.scene.readers.polygon_files import BYTE_ORDER_MARK, in_triangles
 from ldtrefl.scene.readers.polygons import triangles_of
 from ldtrefl.scene.welding import first_of_equals
 
@@ -42,13 +42,14 @@ class Piece:
     """trimesh's material."""
 
 
-def pieces_of(data: bytes, kind: str, beside: Resolver) -> list[Piece]:
+def pieces_of(data: bytes, kind: str, beside: Resolver, *, polygons: bool) -> list[Piece]:
     """The pieces of a mesh file in the order of its nodes, where these place them.
 
     Args:
         data: the file.
         kind: how its name ends, such as 'obj' or 'glb'.
         beside: reads the files that it names.
+        polygons: it may hold polygons of more than three corners.
 
     Raises:
         InputError: a triangle has a vertex that there is not. Other exceptions: the file is damaged.
@@ -56,7 +57,7 @@ def pieces_of(data: bytes, kind: str, beside: Resolver) -> list[Piece]:
     options = {"fix_texture": False} if kind == "ply" else {}
     if kind in ("obj", "off"):
         data = _as_utf8(data)
-    if has_polygons(data, kind):
+    if polygons:
         data = in_triangles(data, kind)
     read = mesh_loaders[kind](file_obj=io.BytesIO(data), file_type=kind, resolver=beside, metadata=None, **options)
     if kind == "ply":
@@ -73,7 +74,7 @@ def pieces_of(data: bytes, kind: str, beside: Resolver) -> list[Piece]:
 
 def _as_utf8(data: bytes) -> bytes:
     """A text file without a byte order mark; what is not UTF-8, as some comments, is taken for Latin-1."""
-    data = data.removeprefix(b"\xef\xbb\xbf")
+    data = data.removeprefix(BYTE_ORDER_MARK)
     try:
         data.decode()
     except UnicodeDecodeError:

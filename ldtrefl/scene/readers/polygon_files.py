@@ -17,11 +17,16 @@ from ldtrefl.scene.readers.polygons import triangles_of
 OBJ_POLYGON = re.compile(rb"^[ \t]*f(?:[ \t]+[^\s#]+){4}|^[ \t]*f[^\n#]*-", re.MULTILINE)
 """A face of four corners, or one with relative numbers."""
 
+BYTE_ORDER_MARK = b"\xef\xbb\xbf"
+"""With which a text file in UTF-8 may begin: it is no part of the first line."""
+
 
 def has_polygons(data: bytes, kind: str) -> bool:
     """Whether a mesh file of some kind may hold polygons of more than three corners. Takes little memory."""
     if kind == "obj":
-        return OBJ_POLYGON.search(data) is not None or b"\\\n" in data or b"\\\r" in data
+        begin = len(BYTE_ORDER_MARK) if data.startswith(BYTE_ORDER_MARK) else 0
+        lines = memoryview(data)[begin:]
+        return OBJ_POLYGON.search(lines) is not None or b"\\\n" in data or b"\\\r" in data
     if kind == "ply":
         table = PlyFile.of(data)
         return table is not None and not table.is_of_triangles()

@@ -74,3 +74,11 @@ def test_relative_numbers_of_an_obj_count_from_where_they_stand(tmp_path: Path) 
     (tmp_path / "a.obj").write_text("".join(square.format(z) for z in range(3)))
     mesh = ldtrefl.load_mesh(tmp_path / "a.obj")
     np.testing.assert_array_equal(mesh.vertices[mesh.faces][:, :, 2], [[0] * 3, [1] * 3, [2] * 3])
+
+
+def test_a_byte_order_mark_hides_no_polygon_of_the_first_line(tmp_path: Path) -> None:
+    square = "f 1 2 3 4\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
+    for encoding in ("utf-8", "utf-8-sig"):
+        (tmp_path / f"{encoding}.obj").write_text(square, encoding=encoding)
+        mesh = ldtrefl.load_mesh(tmp_path / f"{encoding}.obj")
+        np.testing.assert_array_equal(mesh.faces, [[0, 1, 2], [2, 3, 0]])
