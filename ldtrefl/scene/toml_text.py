@@ -8,14 +8,13 @@ and some 40 MiB a megabyte.
 
 from __future__ import annotations
 
-import os
 import re
-import stat
 import tomllib
 from pathlib import Path
 from typing import Any
 
 from ldtrefl.base.errors import InputError
+from ldtrefl.files.regular_files import read_regular
 
 MAX_BYTES = 4 << 20
 """The largest scene file: 16,384 objects with all their keys take three quarters of it."""
@@ -97,39 +96,3 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise InputError(f"{path}: not TOML ({error})") from error
     except InputError as error:
         raise error.within(str(path)) from None
-
-
-def read_regular(path: Path, limit: int, what: str) -> bytes:
-    """The bytes of a regular file of at most ``limit`` bytes; a pipe or a device, which may never end, is refused.
-
-    Raises:
-        InputError: naming the file.
-    """
-    try:
-        check_regular(path, what)
-        # Should it have become a pipe since, it is opened without waiting for a writer.
-        descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
-        with open(descriptor, "rb") as file:
-            size = os.fstat(descriptor).st_size
-            data = file.read(limit + 1) if size <= limit and stat.S_ISREG(os.fstat(descriptor).st_mode) else None
-    except OSError as error:
-        raise InputError(f"{path}: {what} cannot be read ({error.strerror})") from error
-    if data is None or len(data) > limit:
-        raise InputError(f"{path}: {what} has {size} bytes, at most {limit} allowed")
-    return data
-
-
-def check_regular(path: Path, what: str) -> None:
-    """Refuse what is there and is no regular file.
-
-    Raises:
-        OSError: there is nothing of this name.
-        InputError: a folder, a pipe or a device.
-    """
-    try:
-        mode = path.stat().st_mode
-    except ValueError as error:  # a null character
-        raise InputError(f"{path}: is no file name") from error
-    if not stat.S_ISREG(mode):
-        kind = "a folder" if stat.S_ISDIR(mode) else "a pipe" if stat.S_ISFIFO(mode) else "a device or socket"
-        raise InputError(f"{path}: {what} must be a regular file, this is {kind}")
