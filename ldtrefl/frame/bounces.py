@@ -1,15 +1,16 @@
 """A reflected ray's life, written once for every tracer.
 
-    start at the reflector -> closest hit over all other objects -> shade, or environment -> bounce, or end
+    start at the reflector -> closest hit over all objects -> shade, or environment -> bounce, or end
 
-Rays live in arrays; a bounce is two launches, ``closest_hits`` and ``shade_hits``, both built from a tracer. When the
-bounces are used up, a mirror reflects the environment alone. What each ray brings is added up by itself, and the rays
-of a pixel are then summed in their order, so that no bit depends on threads.
+Rays live in arrays; a bounce is two launches, ``closest_hits`` and ``shade_hits``, both built from a tracer. Rays that
+go on from mirrors are then taken into arrays of their own. A mirror reflects the environment alone when the bounces
+are used up, or when so little of what a ray brings would still arrive that it is not worth following. What each ray
+brings is added up by itself, and the rays of a pixel are then summed in their order, so that no bit depends on threads.
 
 Device space throughout; directions have unit length.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -21,16 +22,37 @@ from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.regions import Regions
 from ldtrefl.frame.shadows import direct_radiance_of
 from ldtrefl.frame.skip_options import SkipOptions
+from ldtrefl.frame.taken_rays import taken
 from ldtrefl.geometry.vectors import point_along
 from ldtrefl.shading.environment import environment_radiance
 from ldtrefl.shading.specular import mirror_direction
-from ldtrefl.shading.surface import extended_coordinates, surface_at
+from ldtrefl.shading.surface import Surface, extended_coordinates, may_return, surface_at
 from ldtrefl.tracing.closest_hits import closest_hits_kernel
 from ldtrefl.tracing.nothing import no_shadows
 from ldtrefl.tracing.object_sets import ObjectSets
-from ldtrefl.tracing.ray_buffers import HitBuffer, RayBuffer, cloned, empty_hits
+from ldtrefl.tracing.ray_buffers import HitBuffer, RayBuffer, empty_hits, empty_rays
 from ldtrefl.tracing.tracer import BoundTracer, Tracer, block_of
 from ldtrefl.world.records import LightingRecord, ObjectRecord
+
+FARTHER = wp.constant(64.0)
+"""Where a ray has come from more than this many of an object's radii away, its hit is placed by its barycentrics: along
+the ray it is rounded by the ray's length, which may be many times the object."""
+
+
+@wp.func
+def hit_surface(objects: wp.array(dtype=ObjectRecord), rays: RayBuffer, hits: HitBuffer, i: int) -> Surface:
+    """The surface that ray ``i`` has met."""
+    index, triangle, direction = hits.object[i], hits.triangle[i], rays.direction[i]
+    uv = hits.barycentrics[i]
+    point = point_along(rays.origin[i], direction, hits.t[i])
+    stands_for_many = uv[0] < 0.0
+    if stands_for_many:
+        uv = extended_coordinates(objects[index], triangle, point)
+    surface = surface_at(objects, index, triangle, uv[0], uv[1], direction)
+    # What a map answers lies a little off the triangle: such a point is shaded where it is.
+    if stands_for_many or not hits.t[i] > FARTHER * objects[index].radius:
+        surface.position = point
+    return surface
 
 
 @launch.once
@@ -42,46 +64,48 @@ def shade_hits_kernel(tracer: Tracer) -> wp.Kernel:
     def shade_hits(
         first: int,
         # In:
+        rays: RayBuffer,
         hits: HitBuffer,
         objects: wp.array(dtype=ObjectRecord),
         lighting: LightingRecord,
         views: wp.array(dtype=tracer.view),
-        is_last: int,
+        numbers: wp.array(dtype=wp.int32),  # of the rays among the first bounce's; empty: they are those
+        least_weight: float,
         # In and out:
-        rays: RayBuffer,
-        radiance: wp.array(dtype=wp.vec3),  # that each ray brings
+        radiance: wp.array(dtype=wp.vec3),  # that each of the first bounce's rays brings
+        # Out: the rays that go on, where a source is not -1
+        onwards_out: RayBuffer,
     ):
         """Shade what one ray has met."""
         i = first + wp.tid()
+        onwards_out.source[i] = -1
         if rays.source[i] < 0:
             return
-        direction = rays.direction[i]
+        number = i
+        if numbers.shape[0] > 0:
+            number = numbers[i]
         throughput = rays.throughput[i]
-        index = hits.object[i]
-        source = int(-1)
-        if index < 0:
-            radiance[i] = radiance[i] + wp.cw_mul(throughput, environment_radiance(lighting, direction))
-        else:
-            uv = hits.barycentrics[i]
-            point = point_along(rays.origin[i], direction, hits.t[i])
-            if uv[0] < 0.0:
-                uv = extended_coordinates(objects[index], hits.triangle[i], point)
-            surface = surface_at(objects, index, hits.triangle[i], uv[0], uv[1], direction)
-            # Shade at the point on the ray: what a map answers lies a little off the triangle.
-            surface.position = point
-            light = direct_radiance(views, objects, lighting, surface)
-            if wp.max(surface.mirror) > 0.0:
-                onwards = mirror_direction(direction, surface.normal)
-                if is_last != 0:
-                    light += wp.cw_mul(surface.mirror, environment_radiance(lighting, onwards))
-                else:
-                    rays.origin[i] = surface.position
-                    rays.direction[i] = onwards
-                    rays.throughput[i] = wp.cw_mul(throughput, surface.mirror)
-                    rays.source_triangle[i] = hits.triangle[i]
-                    source = index
-            radiance[i] = radiance[i] + wp.cw_mul(throughput, light)
-        rays.source[i] = source
+        if hits.object[i] < 0:
+            brought = environment_radiance(lighting, rays.direction[i])
+            radiance[number] = radiance[number] + wp.cw_mul(throughput, brought)
+            return
+        surface = hit_surface(objects, rays, hits, i)
+        light = direct_radiance(views, objects, lighting, surface)
+        if wp.max(surface.mirror) > 0.0:
+            direction = mirror_direction(rays.direction[i], surface.normal)
+            onwards = wp.cw_mul(throughput, surface.mirror)
+            if wp.max(onwards) < least_weight:
+                light += wp.cw_mul(surface.mirror, environment_radiance(lighting, direction))
+            else:
+                onwards_out.pixel[i] = rays.pixel[i]
+                onwards_out.origin[i] = surface.position
+                onwards_out.direction[i] = direction
+                onwards_out.throughput[i] = onwards
+                onwards_out.source[i] = surface.object
+                onwards_out.source_triangle[i] = surface.triangle
+                returns = may_return(objects[surface.object], surface)
+                onwards_out.may_return[i] = wp.where(returns, wp.uint8(1), wp.uint8(0))
+        radiance[number] = radiance[number] + wp.cw_mul(throughput, light)
 
     return shade_hits
 
@@ -132,6 +156,26 @@ class Guide(Protocol):
         """The tracer for rays that can meet these objects."""
 
 
+@dataclass(frozen=True)
+class BounceLimits:
+    """When rays end that could be followed further."""
+
+    most: int
+    """Reflections of a ray; 1 or more."""
+    least_weight: float
+    """A ray ends at a mirror if less than this share of what it meets next would still arrive."""
+
+
+@dataclass(frozen=True, eq=False)
+class LaterBounce:
+    """Where rays ended that had been mirrored once or more on their way."""
+
+    numbers: np.ndarray
+    """(m,) int32: of these rays among the first bounce's."""
+    hits: HitBuffer
+    """Of each of them."""
+
+
 @dataclass(frozen=True, eq=False)
 class FollowedRays:
     """Rays of the first bounce, and what became of them."""
@@ -144,6 +188,10 @@ class FollowedRays:
     """Where each ended after its first reflection."""
     radiance: wp.array
     """(n,) vec3 that each brings, by all of its bounces."""
+    source_onwards: wp.array
+    """(n,) int32: the mirror that each goes on from after that; -1 where it ends."""
+    later: tuple[LaterBounce, ...] = ()
+    """The bounces after the first."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,36 +200,42 @@ class RayFollower:
 
     gbuffer: GBuffer
     guide: Guide
-    max_bounces: int
+    limits: BounceLimits
     skip: SkipOptions
     stats: Stats
 
     def first_regions(self, rays: RayBuffer) -> Regions:
         """Which objects the first rays can meet."""
+        return self._regions(rays, 0)
+
+    def _regions(self, rays: RayBuffer, bounce: int) -> Regions:
         with self.stats.stage("cull", self.gbuffer.scene.device):
-            return self.guide.regions(self.gbuffer, rays, 0, self.stats)
+            return self.guide.regions(self.gbuffer, rays, bounce, self.stats)
 
     def follow(self, rays: RayBuffer, regions: Regions) -> FollowedRays:
         """Follow rays until they end; ``regions`` are the first bounce's."""
         device, count = self.gbuffer.scene.device, rays.pixel.shape[0]
-        radiance = wp.zeros(count, dtype=wp.vec3, device=device)
-        hits = first_hits = empty_hits(count, device)
-        followed = FollowedRays(rays, regions.sets, first_hits, radiance)
-        # Bounces change the rays; the last one writes nothing but the source.
-        going = cloned(RayBuffer, rays, ("source",) if self.max_bounces == 1 else None)
-        for bounce in range(self.max_bounces):
-            is_last = bounce + 1 == self.max_bounces
-            if not self.bounce(going, regions, hits, radiance, is_last=is_last):
+        radiance, numbers = wp.zeros(count, dtype=wp.vec3, device=device), np.arange(count, dtype=np.int32)
+        hits, onwards = self._bounce(rays, regions, None, radiance, is_last=self.limits.most == 1)
+        followed = FollowedRays(rays, regions.sets, hits, radiance, onwards.source)
+        later = []
+        for bounce in range(1, self.limits.most):
+            left = np.flatnonzero(onwards.source.numpy() >= 0)
+            if len(left) == 0:
                 break
-            with self.stats.stage("cull", device):
-                regions = self.guide.regions(self.gbuffer, going, bounce + 1, self.stats)
-            hits = empty_hits(count, device)
-        return followed
+            numbers, going = numbers[left], taken(onwards, left)
+            regions = self._regions(going, bounce)
+            is_last = bounce + 1 == self.limits.most
+            hits, onwards = self._bounce(going, regions, numbers, radiance, is_last=is_last)
+            later.append(LaterBounce(numbers, hits))
+        return replace(followed, later=tuple(later))
 
-    def bounce(self, rays: RayBuffer, regions: Regions, hits: HitBuffer, radiance: wp.array, *, is_last: bool) -> int:
-        """Find where rays end and shade that; returns the number of rays that go on."""
+    def _bounce(
+        self, rays: RayBuffer, regions: Regions, numbers: np.ndarray | None, radiance: wp.array, *, is_last: bool
+    ) -> tuple[HitBuffer, RayBuffer]:
+        """(where rays end, the rays that go on from there); what they bring is added to ``radiance`` at ``numbers``."""
         scene, device, count = self.gbuffer.scene, self.gbuffer.scene.device, rays.pixel.shape[0]
-        tracer = self.guide.traced(self._needed(regions), self.stats)
+        tracer, hits = self.guide.traced(self._needed(regions), self.stats), empty_hits(count, device)
         with self.stats.stage("march", device):
             inputs = [rays, scene.records, tracer.views, regions.sets, hits]
             block = block_of(device)
@@ -189,10 +243,12 @@ class RayFollower:
             launch.launch(kernel, -(-count // block), inputs, device)
             self._count(rays, hits)
         with self.stats.stage("shade", device):
-            shadow = tracer if scene.lighting.shadows else no_shadows(device)
-            inputs = [hits, scene.records, scene.lighting, shadow.views, int(is_last), rays, radiance]
+            shadow, onwards = tracer if scene.lighting.shadows else no_shadows(device), empty_rays(count, device)
+            places = wp.array(np.empty(0, np.int32) if numbers is None else numbers, dtype=wp.int32, device=device)
+            weight = np.inf if is_last else self.limits.least_weight
+            inputs = [rays, hits, scene.records, scene.lighting, shadow.views, places, weight, radiance, onwards]
             launch.launch(shade_hits_kernel(shadow.tracer), count, inputs, device)
-            return 0 if is_last else int(np.count_nonzero(rays.source.numpy() >= 0))
+        return hits, onwards
 
     def _needed(self, regions: Regions) -> set[int]:
         """The objects that the tracer must be ready for."""
@@ -203,9 +259,10 @@ class RayFollower:
 
     def _count(self, rays: RayBuffer, hits: HitBuffer) -> None:
         stats = self.stats
-        alive = int(np.count_nonzero(rays.source.numpy() >= 0))
+        alive = rays.source.numpy() >= 0
         searches = int(hits.searches.numpy().sum(dtype=np.int64))
-        stats.count("rays", alive)
+        stats.count("rays", int(np.count_nonzero(alive)))
         stats.count("steps", int(hits.steps.numpy().sum(dtype=np.int64)))
         stats.count("searches", searches)
-        stats.count("searches_saved", alive * (len(self.gbuffer.scene.objects) - 1) - searches)
+        others = int(np.count_nonzero(alive)) * (len(self.gbuffer.scene.objects) - 1)
+        stats.count("searches_saved", others + int(np.count_nonzero(rays.may_return.numpy()[alive])) - searches)

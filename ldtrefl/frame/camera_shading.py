@@ -9,7 +9,7 @@ from ldtrefl.frame.gbuffer import GBuffer, GBufferView, pixel_ray, pixel_surface
 from ldtrefl.frame.shadows import direct_radiance_of
 from ldtrefl.shading.environment import environment_radiance
 from ldtrefl.shading.specular import mirror_direction
-from ldtrefl.shading.surface import Surface
+from ldtrefl.shading.surface import Surface, may_return
 from ldtrefl.tracing.nothing import no_shadows
 from ldtrefl.tracing.ray_buffers import RayBuffer, empty_rays
 from ldtrefl.tracing.tracer import BoundTracer, Tracer
@@ -44,13 +44,14 @@ def shade_pixels_kernel(tracer: Tracer) -> wp.Kernel:
 
 
 @wp.func
-def start_ray(rays: RayBuffer, i: int, surface: Surface, direction: wp.vec3):
+def start_ray(rays: RayBuffer, i: int, objects: wp.array(dtype=ObjectRecord), surface: Surface, direction: wp.vec3):
     """Start ray ``i`` at a surface that is seen along unit ``direction``, in the mirrored direction."""
     rays.origin[i] = surface.position
     rays.direction[i] = mirror_direction(direction, surface.normal)
     rays.throughput[i] = wp.vec3(1.0)
     rays.source[i] = surface.object
     rays.source_triangle[i] = surface.triangle
+    rays.may_return[i] = wp.where(may_return(objects[surface.object], surface), wp.uint8(1), wp.uint8(0))
 
 
 @launch.once
@@ -82,7 +83,7 @@ def shade_reflectors_kernel(tracer: Tracer, starts_rays: bool) -> wp.Kernel:
         mirror_out[i] = surface.mirror
         if with_rays:
             rays.pixel[i] = pixel
-            start_ray(rays, i, surface, view.direction)
+            start_ray(rays, i, objects, surface, view.direction)
 
     return shade_reflectors
 

@@ -3,7 +3,8 @@
 For each triangle of the reflector the object's bounding sphere is mirrored in the triangle's plane. The triangle is
 kept if it overlaps the cone from the camera about the mirrored sphere: a corner lies inside, an edge crosses the cone,
 or the whole ellipse lies inside the triangle. The test takes the reflector for flat triangles, so with interpolated
-normals it drops pixels that do reflect. Later bounces are not culled.
+normals it drops pixels that do reflect. Later bounces are not culled, nor is the reflector itself, which the paper
+leaves out: its sphere reaches its own triangles.
 
 All in device space.
 """
@@ -108,7 +109,10 @@ def cull_triangles(
     c = from_to(eye, wp.transform_point(device_from_unit, as_double(objects[reflector].vertices[corners[2]])))
     for k in range(objects.shape[0]):
         centre = from_to(eye, objects[k].centre)
-        if k != reflector and shows_flat(wp.vec3(0.0), a, b, c, centre, objects[k].radius):
+        is_own = k == reflector
+        if is_own and objects[k].returns == 0:
+            continue
+        if is_own or shows_flat(wp.vec3(0.0), a, b, c, centre, objects[k].radius):
             word = bits_out[first_row + triangle, k / 32]
             bits_out[first_row + triangle, k / 32] = word | (wp.uint32(1) << wp.uint32(k % 32))
 

@@ -41,11 +41,13 @@ class RayArrays:
     source: np.ndarray
     origin: np.ndarray
     direction: np.ndarray
+    may_return: np.ndarray
 
     @classmethod
     def of(cls, rays: RayBuffer) -> RayArrays:
         """The arrays of a buffer."""
-        return cls(rays.pixel.numpy(), rays.source.numpy(), rays.origin.numpy(), rays.direction.numpy())
+        arrays = (rays.pixel, rays.source, rays.origin, rays.direction, rays.may_return)
+        return cls(*(array.numpy() for array in arrays))
 
 
 def footprint(rays: RayArrays, width: int, runs: np.ndarray, entry: DeviceObject) -> float | None:
@@ -60,7 +62,8 @@ def footprint(rays: RayArrays, width: int, runs: np.ndarray, entry: DeviceObject
     numbers = rays_of(runs, len(pixel))
     # The choice of rays must not depend on which runs are left out.
     numbers = numbers[numbers % max(1, len(pixel) // CANDIDATES) == 0]
-    numbers = numbers[(source[numbers] >= 0) & (source[numbers] != entry.index)]
+    may_meet = (source[numbers] != entry.index) | (rays.may_return[numbers] != 0)
+    numbers = numbers[(source[numbers] >= 0) & may_meet]
     offset = np.array(entry.record.centre, float) - origin[numbers]
     along = (offset * direction[numbers]).sum(axis=1)
     meets = (along > 0.0) & ((offset**2).sum(axis=1) - along**2 <= (SURELY * float(entry.record.radius)) ** 2)

@@ -1,7 +1,8 @@
 """Following again only the rays that may end elsewhere than in the last frame.
 
 A ray that is the same as in the last frame, and could not meet a moved object then and cannot now, ends where it ended.
-So runs of rays (``tracing/object_sets.py``) are compared, and only the rays of those that have changed are followed.
+If it was mirrored there, it may have met anything after that, and is followed again. So runs of rays
+(``tracing/object_sets.py``) are compared, and only the rays of those that have changed are followed.
 """
 
 from __future__ import annotations
@@ -12,10 +13,11 @@ import numpy as np
 import warp as wp
 
 from ldtrefl.device.launch import kernel, launch
-from ldtrefl.frame.bounces import FollowedRays, RayFollower
+from ldtrefl.frame.bounces import FollowedRays, LaterBounce, RayFollower
 from ldtrefl.frame.regions import Regions
+from ldtrefl.frame.taken_rays import taken
 from ldtrefl.tracing.object_sets import RUN, bits_of, rays_of, sets_of_runs
-from ldtrefl.tracing.ray_buffers import HitBuffer, RayBuffer, cloned, copy_hit, copy_ray, empty_hits, empty_rays
+from ldtrefl.tracing.ray_buffers import HitBuffer, RayBuffer, cloned, copy_hit
 
 
 @kernel
@@ -27,6 +29,7 @@ def find_changed_runs(
     bits: wp.array2d(dtype=wp.uint32),
     bits_before: wp.array2d(dtype=wp.uint32),
     moved: wp.array(dtype=wp.uint32),
+    source_onwards: wp.array(dtype=wp.int32),  # of the rays before, after their first bounce
     # Out:
     changed_out: wp.array(dtype=wp.uint8),
 ):
@@ -39,23 +42,9 @@ def find_changed_runs(
     i = int(RUN * run)
     while i < wp.min(RUN * run + RUN, rays.source.shape[0]) and not changed:
         same = rays.source[i] == before.source[i] and rays.origin[i] == before.origin[i]
-        changed = not (same and rays.direction[i] == before.direction[i])
+        changed = not (same and rays.direction[i] == before.direction[i]) or source_onwards[i] >= 0
         i += 1
     changed_out[run] = wp.where(changed, wp.uint8(1), wp.uint8(0))
-
-
-@kernel
-def take_rays(
-    first: int,
-    # In:
-    numbers: wp.array(dtype=wp.int32),
-    rays: RayBuffer,
-    # Out:
-    part_out: RayBuffer,
-):
-    """Copy one ray to be followed again."""
-    i = first + wp.tid()
-    copy_ray(rays, numbers[i], part_out, i)
 
 
 @kernel
@@ -65,14 +54,17 @@ def put_back(
     numbers: wp.array(dtype=wp.int32),
     part: HitBuffer,
     part_radiance: wp.array(dtype=wp.vec3),
+    part_source_onwards: wp.array(dtype=wp.int32),
     # Out:
     hits_out: HitBuffer,
     radiance_out: wp.array(dtype=wp.vec3),
+    source_onwards_out: wp.array(dtype=wp.int32),
 ):
-    """Write where one ray that was followed again ends, and what it brings."""
+    """Write where one ray that was followed again ends, what it brings, and whether it goes on there."""
     i = first + wp.tid()
     copy_hit(part, i, hits_out, numbers[i])
     radiance_out[numbers[i]] = part_radiance[i]
+    source_onwards_out[numbers[i]] = part_source_onwards[i]
 
 
 def changed_runs(before: FollowedRays, rays: RayBuffer, regions: Regions, moved: Set[int]) -> np.ndarray | None:
@@ -86,7 +78,7 @@ def changed_runs(before: FollowedRays, rays: RayBuffer, regions: Regions, moved:
     device, runs = rays.pixel.device, sets.bits.shape[0]
     moved_bits = wp.array(bits_of(moved, 32 * sets.bits.shape[1]), dtype=wp.uint32, device=device)
     flags = wp.empty(runs, dtype=wp.uint8, device=device)
-    inputs = [rays, before.rays, sets.bits, before.sets.bits, moved_bits, flags]
+    inputs = [rays, before.rays, sets.bits, before.sets.bits, moved_bits, before.source_onwards, flags]
     launch(find_changed_runs, runs, inputs, device)
     return np.flatnonzero(flags.numpy())
 
@@ -94,18 +86,22 @@ def changed_runs(before: FollowedRays, rays: RayBuffer, regions: Regions, moved:
 def follow_changed(
     follower: RayFollower, before: FollowedRays, rays: RayBuffer, regions: Regions, runs: np.ndarray
 ) -> FollowedRays:
-    """Rays of one bounce of which all but those in ``runs`` end as they did ``before``, which stays as it was."""
+    """Rays of which all but those in ``runs`` bring what they brought ``before``, which stays as it was."""
     device = rays.pixel.device
-    followed = FollowedRays(rays, regions.sets, cloned(HitBuffer, before.hits), wp.clone(before.radiance))
     numbers = rays_of(runs, rays.pixel.shape[0])
     count = len(numbers)
+    hits, radiance, source_onwards = (
+        cloned(HitBuffer, before.hits),
+        wp.clone(before.radiance),
+        wp.clone(before.source_onwards),
+    )
+    later: tuple[LaterBounce, ...] = ()  # what was mirrored again is followed again
     if count:
-        chosen = wp.array(numbers.astype(np.int32), dtype=wp.int32, device=device)
-        part, hits = empty_rays(count, device), empty_hits(count, device)
-        radiance = wp.zeros(count, dtype=wp.vec3, device=device)
-        launch(take_rays, count, [chosen, rays, part], device)
+        part, chosen = taken(rays, numbers), wp.array(numbers.astype(np.int32), dtype=wp.int32, device=device)
         bits = wp.array(regions.sets.bits.numpy()[runs], dtype=wp.uint32, device=device)
-        follower.bounce(part, Regions(sets_of_runs(bits), regions.shown), hits, radiance, is_last=True)
-        launch(put_back, count, [chosen, hits, radiance, followed.hits, followed.radiance], device)
+        again = follower.follow(part, Regions(sets_of_runs(bits), regions.shown))
+        inputs = [chosen, again.hits, again.radiance, again.source_onwards, hits, radiance, source_onwards]
+        launch(put_back, count, inputs, device)
+        later = tuple(LaterBounce(numbers[bounce.numbers], bounce.hits) for bounce in again.later)
     follower.stats.count("rays_kept", rays.pixel.shape[0] - count)
-    return followed
+    return FollowedRays(rays, regions.sets, hits, radiance, source_onwards, later)

@@ -107,7 +107,7 @@ def cull_runs(
                 while i < end:
                     if (
                         rays.source[i] >= 0
-                        and rays.source[i] != k
+                        and (rays.source[i] != k or rays.may_return[i] != wp.uint8(0))
                         and meets_sphere(rays.origin[i], rays.direction[i], centre, radius)
                     ):
                         bits = bits | (wp.uint32(1) << wp.uint32(k % 32))
@@ -130,18 +130,18 @@ class Regions:
     """Objects that at least one ray can meet."""
 
 
-def objects_that_rays_meet(scene: DeviceScene) -> set[int]:
-    """Objects that a reflected ray may meet, if each may meet every object but its own."""
+def objects_that_rays_meet(scene: DeviceScene, rays: RayBuffer) -> set[int]:
+    """Objects that rays may meet, if each may meet every object, but its own only where it can come back to it."""
     mirrors = {entry.index for entry in scene.reflectors}
-    # All rays leave the only mirror, so none meets it.
-    alone = mirrors if len(mirrors) == 1 else set()
-    return set(range(len(scene.objects))) - alone if mirrors else set()
+    # If all rays leave the only mirror and none can come back, none meets it.
+    is_left_alone = len(mirrors) == 1 and not rays.may_return.numpy().any()
+    return set(range(len(scene.objects))) - (mirrors if is_left_alone else set()) if mirrors else set()
 
 
-def all_objects(scene: DeviceScene) -> Regions:
-    """Every ray may meet every object but its own."""
+def all_objects(scene: DeviceScene, rays: RayBuffer) -> Regions:
+    """Every ray may meet every object, but its own only where it can come back to it."""
     sets = sets_of_runs(wp.empty((0, 0), dtype=wp.uint32, device=scene.device))
-    return Regions(sets, objects_that_rays_meet(scene))
+    return Regions(sets, objects_that_rays_meet(scene, rays))
 
 
 def safe_regions(gbuffer: GBuffer, rays: RayBuffer, bounce: int, stats: Stats) -> Regions:

@@ -2,12 +2,15 @@
 
 Maps are kept by mesh and resolution. A frame uses exactly the resolutions that are chosen for it, whatever is kept, so
 that it has the bits of a first frame.
+
+A mirror is searched for triangle by triangle: rays start on its own triangles, and what a patch is off by, every
+further bounce makes larger.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ldtrefl.device.stats import Stats
 from ldtrefl.ldt.options import DEFAULT_RESOLUTION, LinearSteps, Quality
@@ -35,6 +38,16 @@ class MapOptions:
     """Texels along a mesh's longest side where nothing else is chosen; None for the default."""
 
 
+@dataclass(frozen=True)
+class MapKey:
+    """Which maps are meant."""
+
+    mesh: DeviceMesh
+    resolution: int
+    quality: Quality
+    trusted: bool
+
+
 @dataclass(frozen=True, eq=False)
 class _Bound:
     """A tracer, and what it was made of."""
@@ -51,8 +64,8 @@ class SceneMaps:
         self.options = options
         self.chosen: Mapping[DeviceMesh, int] = {}
         """Resolutions for the rays to come; a mesh that is not in it has the usual one."""
-        self._maps: dict[tuple[DeviceMesh, int, bool], LayeredDepthTexture] = {}
-        """By mesh, resolution and whether they are trusted; those used last at the end."""
+        self._maps: dict[MapKey, LayeredDepthTexture] = {}
+        """Those used last at the end."""
         self._bound: _Bound | None = None
 
     @property
@@ -62,46 +75,55 @@ class SceneMaps:
 
     def bound(self, scene: DeviceScene, objects: set[int], stats: Stats) -> BoundTracer:
         """The tracer, once the maps of these objects are peeled at the resolutions chosen."""
-        maps = self._maps
+        maps, mirrors = self._maps, _mirrors(scene)
         with stats.stage("peel", scene.device):
             for mesh in dict.fromkeys(scene.objects[index].geometry for index in sorted(objects)):
-                key = self._key(mesh)
+                key = self._key(mesh, mesh in mirrors)
                 if key not in maps:
-                    maps[key] = self._peeled(*key, stats)
+                    maps[key] = self._peeled(key, stats)
                 maps[key] = maps.pop(key)  # used last
             # Whatever was peeled for other frames has no part in this one.
-            current = {mesh: maps.get(self._key(mesh)) for mesh in _meshes(scene)}
+            current = {mesh: maps.get(self._key(mesh, mesh in mirrors)) for mesh in _meshes(scene)}
             if self._bound is None or self._bound.maps != current:
                 self._bound = self._bind(scene, current)
         return self._bound.tracer
 
     def has_usual_maps(self, scene: DeviceScene, objects: set[int]) -> bool:
         """Whether the maps of these objects are made, at the usual resolution."""
+        mirrors = _mirrors(scene)
         meshes = {scene.objects[index].geometry for index in objects}
-        return all((mesh, self.usual, False) in self._maps for mesh in meshes)
+        return all(self._usual_key(mesh, mesh in mirrors) in self._maps for mesh in meshes)
 
     def meshes_without_maps(self, scene: DeviceScene) -> int:
         """Meshes that nothing has been peeled of."""
-        return len(_meshes(scene).keys() - {mesh for mesh, _, _ in self._maps})
+        return len(_meshes(scene).keys() - {key.mesh for key in self._maps})
 
     def drop_old_maps(self) -> None:
         """Of each mesh keep the maps at the ``RESOLUTIONS_KEPT`` that were used last."""
         count: dict[DeviceMesh, int] = {}
         for key in reversed(list(self._maps)):
-            count[key[0]] = count.get(key[0], 0) + 1
-            if count[key[0]] > RESOLUTIONS_KEPT:
+            count[key.mesh] = count.get(key.mesh, 0) + 1
+            if count[key.mesh] > RESOLUTIONS_KEPT:
                 del self._maps[key]
 
-    def _key(self, mesh: DeviceMesh) -> tuple[DeviceMesh, int, bool]:
-        """Which maps of a mesh are meant."""
-        resolution = self.chosen.get(mesh, self.usual)
-        # Coarser than usual they are trusted; at the usual resolution the exact search's patches are checked.
-        trusted = resolution < self.usual
-        return mesh, min(resolution, self.usual) if self.options.search == "exact" else resolution, trusted
+    def _usual_key(self, mesh: DeviceMesh, is_mirror: bool) -> MapKey:
+        """The maps of a mesh for which nothing is chosen."""
+        return MapKey(mesh, self.usual, "exact" if is_mirror else self.options.quality, False)
 
-    def _peeled(self, mesh: DeviceMesh, resolution: int, trusted: bool, stats: Stats) -> LayeredDepthTexture:
-        options = self.options
-        peeled = peel_mesh(mesh, resolution, quality=options.quality, search=options.search, trusted=trusted)
+    def _key(self, mesh: DeviceMesh, is_mirror: bool) -> MapKey:
+        """The maps of a mesh for the rays to come."""
+        usual = self._usual_key(mesh, is_mirror)
+        resolution = self.chosen.get(mesh, self.usual)
+        if self.options.search != "exact":
+            return replace(usual, resolution=resolution)
+        if usual.quality == "exact":
+            return usual  # a tree over all triangles, whatever the resolution
+        # Coarser than usual they are trusted; at the usual resolution the exact search's patches are checked.
+        return replace(usual, resolution=min(resolution, self.usual), trusted=resolution < self.usual)
+
+    def _peeled(self, key: MapKey, stats: Stats) -> LayeredDepthTexture:
+        search = self.options.search
+        peeled = peel_mesh(key.mesh, key.resolution, quality=key.quality, search=search, trusted=key.trusted)
         stats.count("objects_from_cache" if peeled.from_cache else "objects_peeled", 1)
         stats.count("records", peeled.record_count)
         stats.count("map_bytes", peeled.nbytes)
@@ -117,6 +139,11 @@ class SceneMaps:
         }
         views = array_of_views([of_mesh[entry.geometry] for entry in scene.objects], tracer.view, scene.device)
         return _Bound(current, BoundTracer(tracer, views, list(of_mesh.values())))
+
+
+def _mirrors(scene: DeviceScene) -> set[DeviceMesh]:
+    """The meshes of all reflectors."""
+    return {entry.geometry for entry in scene.reflectors}
 
 
 def _meshes(scene: DeviceScene) -> dict[DeviceMesh, None]:

@@ -33,10 +33,12 @@ from pydantic.dataclasses import dataclass as pydantic_dataclass
 
 from ldtrefl.base.errors import InputError, first_fault, unknown_name
 from ldtrefl.device.stats import Stats
+from ldtrefl.frame.bounces import BounceLimits
 from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.history import Reusable
 from ldtrefl.frame.reflected_light import ReflectedLight
 from ldtrefl.frame.skip_options import SkipChoice, skip_names, skip_options_of
+from ldtrefl.scene.description import Scene
 from ldtrefl.tracing.ray_buffers import RayBuffer
 from ldtrefl.tracing.scene_bvh import SceneBvh
 from ldtrefl.tracing.tracer import SceneTracer
@@ -55,6 +57,28 @@ class CommonConfig:
         SkipChoice,
         Field(description=f"What is left out: all that can be, none, or a list of {', '.join(skip_names())}."),
     ] = "all"
+
+
+@pydantic_dataclass(frozen=True, kw_only=True, config=CONFIG)
+class RayConfig(CommonConfig):
+    """The options of methods that follow rays; what is not given is the scene's."""
+
+    max_bounces: Annotated[
+        Annotated[int, Field(strict=True, ge=1, le=64)] | None,
+        Field(description="Reflections of a ray, 1 to 64; the scene's number if not given."),
+    ] = None
+    least_weight: Annotated[
+        Annotated[float, Field(ge=0.0, le=1.0)] | None,
+        Field(description="A ray ends at a mirror if less than this share of what follows would arrive, 0 to 1."),
+    ] = None
+
+    def limits(self, scene: Scene) -> BounceLimits:
+        """When rays end in a scene."""
+        most, least = self.max_bounces, self.least_weight
+        by_scene = scene.reflection
+        return BounceLimits(
+            by_scene.max_bounces if most is None else most, by_scene.least_weight if least is None else least
+        )
 
 
 class Method(abc.ABC):

@@ -1,7 +1,7 @@
 """Ray casting through a BVH: the ground truth.
 
-Per reflector pixel the mirror direction of the interpolated normal, the closest hit over all other objects, shaded;
-the environment on a miss.
+Per reflector pixel the mirror direction of the interpolated normal, the closest hit over all objects, shaded; the
+environment on a miss; and on from there where it meets a mirror.
 
     ldtrefl render scene.toml --method bvh
 
@@ -11,11 +11,6 @@ needs a new tree.
 
 from __future__ import annotations
 
-from typing import Annotated
-
-from pydantic import Field
-from pydantic.dataclasses import dataclass
-
 from ldtrefl.device.stats import Stats
 from ldtrefl.frame.bounces import RayFollower, summed_by_pixel
 from ldtrefl.frame.first_hits import FirstHits
@@ -23,7 +18,7 @@ from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.history import Reusable
 from ldtrefl.frame.reflected_light import ReflectedLight
 from ldtrefl.frame.regions import Regions, all_objects
-from ldtrefl.methods.base import CONFIG, CommonConfig, RayMethod
+from ldtrefl.methods.base import RayConfig, RayMethod
 from ldtrefl.tracing.ray_buffers import RayBuffer
 from ldtrefl.tracing.tracer import BoundTracer
 
@@ -33,28 +28,21 @@ class Bvh(RayMethod):
 
     name = "bvh"
 
-    @dataclass(frozen=True, kw_only=True, config=CONFIG)
-    class Config(CommonConfig):
-        """Options of ``bvh``."""
-
-        max_bounces: Annotated[int, Field(strict=True, ge=1, le=64)] | None = None
-        """Reflections in reflections; the scene's number if not given."""
-
-    config: Config
+    Config = RayConfig
+    config: RayConfig
 
     def reflect_rays(
         self, gbuffer: GBuffer, rays: RayBuffer, reusable: Reusable | None, stats: Stats
     ) -> ReflectedLight:
         """Trace every reflected ray."""
-        bounces = self.config.max_bounces or self.scene.scene.reflection.max_bounces
-        follower = RayFollower(gbuffer, self, bounces, self.skip, stats)
+        follower = RayFollower(gbuffer, self, self.config.limits(self.scene.scene), self.skip, stats)
         followed = follower.follow(rays, follower.first_regions(rays))
         hits = FirstHits.of(gbuffer, followed)
         return ReflectedLight(summed_by_pixel(gbuffer.reflector_pixels, rays, followed.radiance), hits)
 
     def regions(self, gbuffer: GBuffer, rays: RayBuffer, bounce: int, stats: Stats) -> Regions:
-        """Every ray may meet every other object."""
-        return all_objects(self.scene)
+        """Every ray may meet every object."""
+        return all_objects(self.scene, rays)
 
     def traced(self, objects: set[int], stats: Stats) -> BoundTracer:
         """The BVHs of all objects."""

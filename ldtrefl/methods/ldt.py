@@ -44,7 +44,7 @@ from ldtrefl.ldt.options import (
 )
 from ldtrefl.ldt.resolution import resolutions_for
 from ldtrefl.ldt.scene_maps import MapOptions, SceneMaps
-from ldtrefl.methods.base import CONFIG, CommonConfig, RayMethod
+from ldtrefl.methods.base import CONFIG, CommonConfig, RayConfig, RayMethod
 from ldtrefl.tracing.ray_buffers import RayBuffer
 from ldtrefl.tracing.tracer import BoundTracer, SceneTracer
 from ldtrefl.world.device_mesh import DeviceMesh
@@ -61,7 +61,7 @@ class Ldt(RayMethod):
     name = "ldt"
 
     @dataclass(frozen=True, kw_only=True, config=CONFIG)
-    class Config(CommonConfig):
+    class Config(RayConfig):
         """Options of ``ldt``."""
 
         resolution: Resolution | None = None
@@ -78,8 +78,6 @@ class Ldt(RayMethod):
         """Bisections of the step that crosses a surface."""
         cull: Literal["safe", "flat"] = "safe"
         """Reflection regions: safe (loses nothing), flat (the paper's, for flat mirror triangles)."""
-        max_bounces: Annotated[int, Field(strict=True, ge=1, le=64)] | None = None
-        """Reflections in reflections; the scene's number if not given."""
 
     config: Config
     tracer: SceneMaps
@@ -115,8 +113,7 @@ class Ldt(RayMethod):
         self, gbuffer: GBuffer, rays: RayBuffer, reusable: Reusable | None, stats: Stats
     ) -> ReflectedLight:
         """Cull, peel what is left on first need, march."""
-        bounces = self.config.max_bounces or self.scene.scene.reflection.max_bounces
-        follower = RayFollower(gbuffer, self, bounces, self.skip, stats)
+        follower = RayFollower(gbuffer, self, self.config.limits(self.scene.scene), self.skip, stats)
         regions = follower.first_regions(rays)
         chosen = dict(self.tracer.chosen)
         followed = self._followed_again(follower, rays, regions, reusable) or follower.follow(rays, regions)
@@ -151,7 +148,7 @@ class Ldt(RayMethod):
         A ray that has not changed meets no mesh that it could not meet then. So only the maps of meshes that are in
         both frames must be the same.
         """
-        if reusable is None or reusable.reflected.followed is None or follower.max_bounces > 1:
+        if reusable is None or reusable.reflected.followed is None or (self._chooses and follower.limits.most > 1):
             return None
         then, chosen = reusable.reflected.resolutions, self.tracer.chosen
         if self.scene.lighting.shadows or any(then[mesh] != chosen[mesh] for mesh in then.keys() & chosen.keys()):
@@ -176,13 +173,13 @@ class Ldt(RayMethod):
     def _culled(self, gbuffer: GBuffer, rays: RayBuffer, bounce: int, stats: Stats) -> Regions:
         """Which objects the rays of a bounce can meet."""
         is_flat = self.config.cull == "flat"
-        if not self.skip.regions or (is_flat and bounce > 0) or (not is_flat and not self._culling_pays()):
-            return all_objects(self.scene)
+        if not self.skip.regions or (is_flat and bounce > 0) or (not is_flat and not self._culling_pays(rays)):
+            return all_objects(self.scene, rays)
         return flat_regions(gbuffer, rays, stats) if is_flat else safe_regions(gbuffer, rays, bounce, stats)
 
-    def _culling_pays(self) -> bool:
+    def _culling_pays(self, rays: RayBuffer) -> bool:
         """Whether culling saves more than it costs. It does not where all maps that can be needed are made and a few
         objects stand still: to test each ray against their spheres is then as fast as to test runs of rays."""
         if len(self.scene.objects) > FEW_OBJECTS or self._has_moved or self.config.error is not None:
             return True
-        return not self.tracer.has_usual_maps(self.scene, objects_that_rays_meet(self.scene))
+        return not self.tracer.has_usual_maps(self.scene, objects_that_rays_meet(self.scene, rays))

@@ -5,6 +5,7 @@
     mesh.py             a triangle mesh, checked; mesh_arrays.py goes over its arrays
     normals.py          vertex normals, with welding.py and two_sided.py
     outliers.py         the few triangles far outside a mesh's bulk
+    convexity.py        whether rays that leave a mesh can come back to it
     shapes/             procedural meshes, one a file
     readers/            mesh files in many formats
 

@@ -273,7 +273,9 @@ class Reflection:
     """The scene's defaults for rendering; the caller's and the command line's win."""
 
     method: Text = "ldt"
-    max_bounces: Annotated[Whole, Field(ge=1, le=64)] = 1
+    max_bounces: Annotated[Whole, Field(ge=1, le=64)] = 4
+    least_weight: Annotated[Real, Field(ge=0.0, le=1.0)] = 1.0 / 512.0
+    """A ray ends at a mirror if less than this share of what it meets next would still arrive."""
 
 
 @refusing_in_one_line

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from ldtrefl.base.errors import InputError
 from ldtrefl.files.content_key import content_key
 from ldtrefl.files.stored_picture import StoredPicture
+from ldtrefl.scene.convexity import sides_with_returns
 from ldtrefl.scene.mesh_arrays import copied_faces, copied_vertices, fitted_vertices, is_immutable
 from ldtrefl.scene.normals import vertex_normals
 from ldtrefl.scene.outliers import split_outliers
@@ -150,6 +151,12 @@ class Mesh:
         """(n, 3) float32 in the unit frame. The shift is done in float64, so a far-off mesh loses nothing."""
         centre, half = self.unit_frame
         return _read_only(fitted_vertices(self.vertices, centre, half))
+
+    @functools.cached_property
+    def sides_with_returns(self) -> int:
+        """From which sides of its triangles rays can come back to it (``convexity.py``); found when first asked for."""
+        centre, half = self.unit_frame
+        return sides_with_returns((self.vertices - centre) / half, self.faces)
 
 
 def _read_only(array: np.ndarray) -> np.ndarray:

@@ -32,6 +32,7 @@ class Surface:
     triangle: int
     normal: wp.vec3  # shading normal, unit, on the viewer's side of the facet
     facet: wp.vec3  # facet normal, unit, facing the viewer
+    is_back: int  # 1 if the viewer sees the triangle's back, by its winding
     albedo: wp.vec3  # times the texture
     emission: wp.vec3
     mirror: wp.vec3  # specular reflectance in this direction, Fresnel included
@@ -133,6 +134,7 @@ def surface_at(
     facet = objects[index].normal_from_unit * wp.normalize(wp.cross(b - a, c - a))
     if wp.dot(facet, view) > 0.0:
         facet = -facet  # to the side that the viewer sees
+        surface.is_back = 1
     surface.facet = wp.normalize(facet)
     surface.normal = wp.normalize(interpolated_normal(objects, index, corners, u, v, facet))
     surface.albedo = albedo_at(objects, index, triangle, corners, u, v)
@@ -141,3 +143,9 @@ def surface_at(
     if objects[index].fresnel != 0:
         surface.mirror = schlick(surface.mirror, -wp.dot(surface.normal, view))
     return surface
+
+
+@wp.func
+def may_return(record: ObjectRecord, surface: Surface) -> bool:
+    """Whether a ray that is mirrored by a surface may meet the object that it leaves."""
+    return ((record.returns >> surface.is_back) & 1) != 0

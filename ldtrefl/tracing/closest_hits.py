@@ -1,18 +1,23 @@
 """The closest hits of reflected rays over all objects of a scene, for every tracer.
 
-A ray's own object is left out of the search: reflectors do not yet reflect themselves.
+A ray may meet the object that it leaves, too, unless nothing of that object can be seen from its surface
+(``scene/convexity.py``). There it starts above the triangle that it leaves; in other objects, which may touch it, where
+it is.
 """
+
+from collections.abc import Callable
 
 import warp as wp
 
 from ldtrefl.device import launch
 from ldtrefl.geometry.sphere import meets_sphere, sphere_entry
+from ldtrefl.geometry.vectors import as_single
 from ldtrefl.tracing.hit import Hit
 from ldtrefl.tracing.object_sets import ObjectSets, has_bit, lowest_bit, object_bits, without
 from ldtrefl.tracing.ray_buffers import HitBuffer, RayBuffer, keep_nearer, set_miss
 from ldtrefl.tracing.tracer import Query, Tracer
 from ldtrefl.world.records import ObjectRecord
-from ldtrefl.world.unit_rays import into_unit
+from ldtrefl.world.unit_rays import facet_towards, into_unit, start_above_own
 
 BEYOND = wp.constant(1.000001)
 """Factor on a ray's nearest distance so far, up to which the next object is searched: a hit in the same place must be
@@ -20,12 +25,15 @@ found, too, whatever way it is rounded."""
 
 
 @wp.func
-def bits_without_source(
-    sets: ObjectSets, objects: wp.array(dtype=ObjectRecord), source: int, i: int, word: int
+def objects_to_meet(
+    sets: ObjectSets, objects: wp.array(dtype=ObjectRecord), rays: RayBuffer, i: int, word: int
 ) -> wp.uint32:
-    """The objects of a word that ray ``i`` can meet: not the one that it leaves."""
+    """The objects of a word that ray ``i`` can meet, a bit each: none if it is dead."""
+    source = rays.source[i]
+    if source < 0:
+        return wp.uint32(0)
     bits = object_bits(sets, objects, i, word)
-    if source / 32 == word:
+    if source / 32 == word and rays.may_return[i] == wp.uint8(0):
         bits = without(bits, source)
     return bits
 
@@ -63,8 +71,42 @@ def may_meet(record: ObjectRecord, origin: wp.vec3d, direction: wp.vec3, t_max: 
 class SearchedRay:
     """A ray that is searched for in an object."""
 
+    query: Query
     ray: int  # its number
     stretch: float  # length in the object's unit space of a device unit along it
+
+
+@launch.once
+def searched_of(tracer: Tracer) -> Callable[..., SearchedRay]:
+    """``searched_ray(views, objects, k, rays, i, t_max)``: ray ``i`` as it is searched for in object ``k``,
+    up to ``t_max``."""
+    leaving = tracer.leaving
+
+    @wp.func
+    def searched_ray(
+        views: wp.array(dtype=tracer.view),
+        objects: wp.array(dtype=ObjectRecord),
+        k: int,
+        rays: RayBuffer,
+        i: int,
+        t_max: float,
+    ) -> SearchedRay:
+        ray = into_unit(objects[k], rays.origin[i], rays.direction[i])
+        searched = SearchedRay()
+        searched.ray = i
+        searched.stretch = ray.stretch
+        searched.query.origin = ray.origin
+        searched.query.direction = ray.direction
+        # t stays in device units: divide by the direction's length in unit space.
+        searched.query.t_max = t_max * ray.stretch
+        if rays.source[i] == k:
+            triangle = rays.source_triangle[i]
+            searched.query.origin = start_above_own(objects[k], triangle, ray.origin, ray.direction)
+            outwards = as_single(facet_towards(objects[k], triangle, ray.direction))
+            searched.query = leaving(views, k, searched.query, outwards)
+        return searched
+
+    return searched_ray
 
 
 @wp.func
@@ -94,7 +136,8 @@ def keep_found(
 def closest_hits_kernel(tracer: Tracer, block: int, bounds: bool = True) -> wp.Kernel:
     """The kernel that finds where rays end; one item follows ``block`` rays. With ``bounds`` an object is searched only
     for rays that enter its bounding sphere before their nearest hit so far; of 32 the first entered comes first."""
-    find_hits, size, to_infinity = tracer.closest_hits, wp.constant(block), wp.constant(not bounds)
+    find_hits, searched_ray = tracer.closest_hits, searched_of(tracer)
+    size, to_infinity = wp.constant(block), wp.constant(not bounds)
 
     @launch.kernel
     def closest_hits(
@@ -114,6 +157,7 @@ def closest_hits_kernel(tracer: Tracer, block: int, bounds: bool = True) -> wp.K
         queries = wp.array(ptr=query_memory.ptr, shape=(size,), dtype=Query)
         found = wp.array(ptr=hit_memory.ptr, shape=(size,), dtype=Hit)
         searched = wp.zeros(shape=size, dtype=SearchedRay)
+        to_meet = wp.zeros(shape=size, dtype=wp.uint32)  # of each ray, the objects of a word
         lead = int(-1)  # the first ray that is alive: objects are searched in the order in which it enters them
         for i in range(begin, end):
             set_miss(hits, i)
@@ -123,8 +167,8 @@ def closest_hits_kernel(tracer: Tracer, block: int, bounds: bool = True) -> wp.K
         for word in range(words):
             left = wp.uint32(0)
             for i in range(begin, end):
-                if rays.source[i] >= 0:
-                    left = left | bits_without_source(sets, objects, rays.source[i], i, word)
+                to_meet[i - begin] = objects_to_meet(sets, objects, rays, i, word)
+                left = left | to_meet[i - begin]
             while left != wp.uint32(0):
                 k = first_entered(objects, left, word, rays.origin[lead], rays.direction[lead])
                 left = without(left, k)
@@ -132,16 +176,11 @@ def closest_hits_kernel(tracer: Tracer, block: int, bounds: bool = True) -> wp.K
                 # Search for the rays that may meet it.
                 count = int(0)
                 for i in range(begin, end):
-                    source = rays.source[i]
-                    if source >= 0 and has_bit(bits_without_source(sets, objects, source, i, word), k):
+                    if has_bit(to_meet[i - begin], k):
                         if to_infinity or may_meet(objects[k], rays.origin[i], rays.direction[i], hits.t[i]):
-                            ray = into_unit(objects[k], rays.origin[i], rays.direction[i])
-                            queries[count].origin = ray.origin
-                            queries[count].direction = ray.direction
-                            # t stays in device units: divide by the direction's length in unit space.
-                            queries[count].t_max = wp.where(to_infinity, wp.inf, BEYOND * hits.t[i] * ray.stretch)
-                            searched[count].ray = i
-                            searched[count].stretch = ray.stretch
+                            t_max = wp.where(to_infinity, wp.inf, BEYOND * hits.t[i])
+                            searched[count] = searched_ray(views, objects, k, rays, i, t_max)
+                            queries[count] = searched[count].query
                             count += 1
                 if count > 0:
                     find_hits(views, k, queries, count, found)

@@ -27,6 +27,7 @@ class RayBuffer:
     throughput: wp.array(dtype=wp.vec3)  # what a unit of radiance met now adds to what the ray brings
     source: wp.array(dtype=wp.int32)  # the object that it leaves
     source_triangle: wp.array(dtype=wp.int32)  # and the triangle of that object
+    may_return: wp.array(dtype=wp.uint8)  # 1 if it may meet that object, too
 
 
 @wp.struct
@@ -83,6 +84,7 @@ def copy_ray(rays: RayBuffer, i: int, rays_out: RayBuffer, k: int):
     rays_out.throughput[k] = rays.throughput[i]
     rays_out.source[k] = rays.source[i]
     rays_out.source_triangle[k] = rays.source_triangle[i]
+    rays_out.may_return[k] = rays.may_return[i]
 
 
 def empty_rays(count: int, device: wp.Device) -> RayBuffer:
@@ -91,6 +93,7 @@ def empty_rays(count: int, device: wp.Device) -> RayBuffer:
     rays.pixel, rays.source, rays.source_triangle = (wp.empty(count, dtype=wp.int32, device=device) for _ in range(3))
     rays.origin = wp.empty(count, dtype=wp.vec3d, device=device)
     rays.direction, rays.throughput = (wp.empty(count, dtype=wp.vec3, device=device) for _ in range(2))
+    rays.may_return = wp.empty(count, dtype=wp.uint8, device=device)
     return rays
 
 

@@ -8,7 +8,7 @@ depth texture and for the BVH. A miss is ``t = +inf`` and triangle -1.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import warp as wp
 
@@ -29,6 +29,12 @@ class Query:
     t_max: float
 
 
+@wp.func
+def _as_it_starts(views: Any, index: int, query: Query, outwards: wp.vec3) -> Query:
+    """``leaving`` of a tracer that finds surfaces where they are."""
+    return query
+
+
 @dataclass(frozen=True)
 class Tracer:
     """Warp functions, and the type of the views that they read."""
@@ -46,6 +52,10 @@ class Tracer:
     """``occluded(views, index, query, outwards) -> bool``: whether one ray meets the object. ``outwards`` is 0, but for
     a ray that leaves the object's own surface: it is then the unit normal there, on the ray's side, and what the tracer
     takes for that surface is not met."""
+    leaving: Callable[..., Query] = _as_it_starts
+    """``leaving(views, index, query, outwards) -> Query``: a ray of ``closest_hits`` that leaves the object's own
+    surface, ``outwards`` as above, on its way from where it does not meet what the tracer takes for that surface. It
+    already starts above its triangle."""
 
 
 @dataclass(frozen=True, eq=False)

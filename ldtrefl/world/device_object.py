@@ -105,6 +105,7 @@ def set_material(
     record.normals = geometry.normals if needs_normals else geometry.no_normals
     record.albedo, record.emission = wp.vec3(*material.albedo), wp.vec3(*material.emission)
     record.mirror = wp.vec3(*material.mirror)
+    record.returns = geometry.mesh.sides_with_returns if source.is_reflector else 0
     look = geometry.appearance(source.texture)
     needs_uvs = look.has_textures or not skip_attributes
     record.uvs = geometry.uvs if needs_uvs else geometry.no_uvs

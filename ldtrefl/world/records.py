@@ -34,6 +34,7 @@ class ObjectRecord:
     albedo: wp.vec3
     emission: wp.vec3  # radiance
     mirror: wp.vec3  # specular reflectance
+    returns: int  # of a reflector: from which sides rays can come back to it (``scene/convexity.py``)
     part_first: wp.array(dtype=wp.int32)  # first triangle of each part
     part_color: wp.array(dtype=wp.vec3)  # linear, times albedo
     part_texture: wp.array(dtype=wp.vec4i)  # first texel, width, height, 1 for bytes; width 0 without a texture

@@ -81,19 +81,26 @@ def start_above(start: wp.vec3d, outwards: wp.vec3) -> wp.vec3d:
 
 
 @wp.func
+def facet_towards(record: ObjectRecord, triangle: int, outwards: wp.vec3) -> wp.vec3d:
+    """A triangle's unit normal in unit space, to the side of ``outwards``; 0 if the triangle has no area."""
+    corners = record.faces[triangle]
+    a = unit_vertex(record, corners[0])
+    normal = wp.normalize(wp.cross(unit_vertex(record, corners[1]) - a, unit_vertex(record, corners[2]) - a))
+    if wp.dot(normal, as_double(outwards)) < wp.float64(0.0):
+        return -normal
+    return normal
+
+
+@wp.func
 def start_above_own(record: ObjectRecord, triangle: int, start: wp.vec3d, outwards: wp.vec3) -> wp.vec3d:
     """Where a ray starts that is searched for in the object that it leaves, in unit space.
 
     It starts above the plane of the triangle that it leaves, to the side of ``outwards``, by the rounding of
     coordinates there. ``start`` may lie a little off that plane: its hit was rounded, or was on a patch.
     """
-    corners = record.faces[triangle]
-    a = unit_vertex(record, corners[0])
-    across = wp.cross(unit_vertex(record, corners[1]) - a, unit_vertex(record, corners[2]) - a)
-    if across == wp.vec3d(wp.float64(0.0)):
+    normal = facet_towards(record, triangle, outwards)
+    if normal == wp.vec3d(wp.float64(0.0)):
         return start
-    normal = wp.normalize(across)
-    if wp.dot(normal, as_double(outwards)) < wp.float64(0.0):
-        normal = -normal
+    a = unit_vertex(record, record.faces[triangle][0])
     # No coordinate of the bulk is larger than 1, and what lies outside is tested in float64.
     return start + (LEAVING - wp.dot(normal, start - a)) * normal

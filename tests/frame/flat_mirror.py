@@ -11,7 +11,7 @@ import numpy as np
 
 from ldtrefl.device import launch
 from ldtrefl.device.stats import Stats
-from ldtrefl.frame.bounces import RayFollower
+from ldtrefl.frame.bounces import BounceLimits, RayFollower
 from ldtrefl.frame.camera_shading import Shaded, shade_gbuffer
 from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.regions import Regions, all_objects, safe_regions
@@ -76,15 +76,16 @@ class RayCasting:
         self.scene, self.culls, self.tracer = device_scene, culls, SceneBvh()
 
     def regions(self, gbuffer: GBuffer, rays: RayBuffer, bounce: int, stats: Stats) -> Regions:
-        return safe_regions(gbuffer, rays, bounce, stats) if self.culls else all_objects(self.scene)
+        return safe_regions(gbuffer, rays, bounce, stats) if self.culls else all_objects(self.scene, rays)
 
     def traced(self, objects: set[int], stats: Stats) -> BoundTracer:
         return self.tracer.bound(self.scene, objects, stats)
 
 
-def follower(gbuffer: GBuffer, bounces: int = 1, *, culls: bool = False) -> RayFollower:
+def follower(gbuffer: GBuffer, bounces: int = 1, *, least_weight: float = 0.0, culls: bool = False) -> RayFollower:
     """A follower of rays by ray casting, with counters of its own."""
-    return RayFollower(gbuffer, RayCasting(gbuffer.scene, culls=culls), bounces, SkipOptions(), Stats())
+    limits = BounceLimits(bounces, least_weight)
+    return RayFollower(gbuffer, RayCasting(gbuffer.scene, culls=culls), limits, SkipOptions(), Stats())
 
 
 def in_world(device_scene: DeviceScene, points: np.ndarray) -> np.ndarray:

@@ -34,6 +34,41 @@ def test_rays_between_two_mirrors_bring_the_known_radiance(bounces: int) -> None
         np.testing.assert_array_equal(getattr(shaded.rays, name).numpy(), values, err_msg="rays stay as they started")
 
 
+@pytest.mark.parametrize(("least_weight", "bounces"), [(0.6, 1), (0.3, 3)])
+def test_a_ray_ends_where_too_little_would_arrive(least_weight: float, bounces: int) -> None:
+    """The box keeps a half and the ground all of one colour: after 1, 2, 3, ... mirrors 1/2, 1/2, 1/4, ... is left."""
+    given = flat_mirror.scene(place=(0.1, 0.2, 0.8), box_mirror=0.5)
+    gbuffer, shaded = flat_mirror.seen_and_shaded(flat_mirror.on_device(given))
+
+    leaves_ground = shaded.rays.source.numpy() == flat_mirror.GROUND
+
+    def radiance(most: int, least: float) -> np.ndarray:
+        follower = flat_mirror.follower(gbuffer, most, least_weight=least)
+        followed = follower.follow(shaded.rays, follower.first_regions(shaded.rays))
+        return followed.radiance.numpy()[leaves_ground]
+
+    by_weight, by_number = radiance(64, least_weight), radiance(bounces, 0.0)
+    np.testing.assert_array_equal(by_weight, by_number)
+    assert (radiance(bounces + 1, 0.0) != by_number).any()
+
+
+def test_later_bounces_tell_which_rays_they_are_and_where_they_end() -> None:
+    """A ray that the box has sent back to the ground ends there, below where it met the box."""
+    given = flat_mirror.scene(box_mirror=0.5)
+    gbuffer, shaded = flat_mirror.seen_and_shaded(flat_mirror.on_device(given))
+    follower = flat_mirror.follower(gbuffer, 2)
+    followed = follower.follow(shaded.rays, follower.first_regions(shaded.rays))
+    (later,) = followed.later
+    source, first = shaded.rays.source.numpy(), followed.hits.object.numpy()
+    np.testing.assert_array_equal(later.numbers, np.flatnonzero(first >= 0))
+    np.testing.assert_array_equal(followed.source_onwards.numpy(), first)
+    sent_back = (source[later.numbers] == flat_mirror.GROUND) & (first[later.numbers] == flat_mirror.BOX)
+    t, t_first = later.hits.t.numpy()[sent_back], followed.hits.t.numpy()[later.numbers][sent_back]
+    is_bottom = later.hits.object.numpy()[sent_back] == flat_mirror.GROUND
+    assert is_bottom.sum() > 20
+    np.testing.assert_allclose(t[is_bottom], t_first[is_bottom], rtol=1e-5)
+
+
 def test_rays_and_searches_are_counted() -> None:
     """One ray a pixel of the ground, which can meet the box alone: searched for if it enters the box's sphere."""
     given = flat_mirror.scene()

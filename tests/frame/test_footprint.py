@@ -56,7 +56,7 @@ def test_pixels_on_what_the_camera_sees() -> None:
     spacing = pixel_spacing(gbuffer)
     assert spacing is not None and spacing / scene.device_units_per_world_unit == pytest.approx(EYE * PIXEL, rel=1e-6)
     # Nearer than the ball's reflection, so that is what counts where both do.
-    both = finest_footprints(gbuffer, shaded.rays, all_objects(scene), is_seen=True)
+    both = finest_footprints(gbuffer, shaded.rays, all_objects(scene, shaded.rays), is_seen=True)
     assert both == {0: spacing, 1: spacing}
 
 
@@ -66,7 +66,7 @@ def test_nothing_is_known_where_nothing_is_met() -> None:
     below = Object(shape="sphere", translate=(0, 0, -9))
     scene = flat_mirror.on_device(dataclasses.replace(given, objects=(given.objects[0], below)))
     gbuffer, shaded = flat_mirror.seen_and_shaded(scene)
-    assert finest_footprints(gbuffer, shaded.rays, all_objects(scene), is_seen=False) == {1: None}
+    assert finest_footprints(gbuffer, shaded.rays, all_objects(scene, shaded.rays), is_seen=False) == {1: None}
     away = Camera(eye=(0, 0, EYE), look_at=(0, 0, 9), up=(0, 1, 0), width=8, height=8)
     nothing, shaded = flat_mirror.seen_and_shaded(flat_mirror.on_device(scene.scene.with_camera(away)))
     assert pixel_spacing(nothing) is None

@@ -1,11 +1,13 @@
 """Rays followed again after a move, against all of them followed anew: the same bits, and no more rays than needed."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 from ldtrefl.frame.bounces import FollowedRays
 from ldtrefl.frame.refollow import changed_runs, follow_changed
-from ldtrefl.scene.description import Camera
+from ldtrefl.scene.description import Camera, Material, Object
 from ldtrefl.tracing.object_sets import rays_of
 from ldtrefl.tracing.ray_buffers import HitBuffer
 from ldtrefl.world.device_scene import DeviceScene
@@ -17,17 +19,18 @@ DOWN = Camera(eye=(0.3, -3.0, 2.0), look_at=(0.0, -0.6, 0.0), width=128, height=
 PLACES = ((0.1, 1.2, 2.0), (0.4, 1.2, 2.1))
 
 
-def followed_anew(scene: DeviceScene) -> FollowedRays:
+def followed_anew(scene: DeviceScene, bounces: int = 1) -> FollowedRays:
     gbuffer, shaded = flat_mirror.seen_and_shaded(scene)
     assert set(gbuffer.objects.ravel().tolist()) <= {-1, flat_mirror.GROUND}
-    follower = flat_mirror.follower(gbuffer, culls=True)
+    follower = flat_mirror.follower(gbuffer, bounces, culls=True)
     return follower.follow(shaded.rays, follower.first_regions(shaded.rays))
 
 
 def values(followed: FollowedRays) -> dict[str, np.ndarray]:
     """What is known of the rays, as copies."""
     hits = {name: getattr(followed.hits, name).numpy().copy() for name in HitBuffer.vars}
-    return {**hits, "radiance": followed.radiance.numpy().copy()}
+    rest = {"radiance": followed.radiance, "source_onwards": followed.source_onwards}
+    return {**hits, **{name: array.numpy().copy() for name, array in rest.items()}}
 
 
 def meets_box(followed: FollowedRays, scene: DeviceScene) -> np.ndarray:
@@ -64,6 +67,34 @@ def test_only_runs_that_can_meet_what_moved_are_followed_again() -> None:
     assert (values(truth)["object"] != as_before["object"]).sum() > 50
     assert follower.stats.counters["rays"] == again.sum()
     assert follower.stats.counters["rays_kept"] == count - again.sum()
+
+
+def test_rays_that_were_mirrored_again_are_followed_again() -> None:
+    """A mirror box stands still, and in it the ground sees a glowing ball that moves below and behind it."""
+    glowing = Material(emission=(9.0,) * 3)
+    ball = Object(name="ball", shape="sphere", scale=1.5, translate=(0.1, 6.0, -4.2), material=glowing)
+    given = flat_mirror.scene(PLACES[0], box_mirror=0.5, camera=DOWN)
+    given = dataclasses.replace(given, objects=(*given.objects, ball))
+    scene = flat_mirror.on_device(given)
+    before = followed_anew(scene, 3)
+    moved_scene = flat_mirror.on_device(given.with_object("ball", translate=(0.5, 6.0, -4.2)), scene)
+    truth = followed_anew(moved_scene, 3)
+    gbuffer, shaded = flat_mirror.seen_and_shaded(moved_scene)
+    follower = flat_mirror.follower(gbuffer, 3, culls=True)
+    regions = follower.first_regions(shaded.rays)
+    runs = changed_runs(before, shaded.rays, regions, {2})
+    assert runs is not None
+    found = follow_changed(follower, before, shaded.rays, regions, runs)
+    assert (values(truth)["radiance"] != values(before)["radiance"]).any(axis=1).sum() > 30
+    for name, expected in values(truth).items():
+        np.testing.assert_array_equal(values(found)[name], expected, err_msg=name)
+    for mine, right in zip(found.later, truth.later, strict=True):
+        np.testing.assert_array_equal(mine.numbers, right.numbers)
+        np.testing.assert_array_equal(mine.hits.t.numpy(), right.hits.t.numpy())
+    mirrored_again = before.source_onwards.numpy() >= 0
+    again = np.zeros(len(mirrored_again), bool)
+    again[rays_of(runs, len(again))] = True
+    assert again[mirrored_again].all() and again.mean() < 0.7
 
 
 def test_nothing_that_moved_is_met_or_nothing_is_known() -> None:

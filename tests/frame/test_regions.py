@@ -29,6 +29,7 @@ def test_no_ray_is_lost(bend: float) -> None:
     rays.direction = on_device(directions.reshape(-1, 3))
     device, n = rays.origin.device, rays.origin.shape[0]
     rays.source = wp.full(n, SPHERES, dtype=wp.int32, device=device)
+    rays.may_return = wp.zeros(n, dtype=wp.uint8, device=device)
     objects = []
     for c, r in zip(centre, radius, strict=True):
         record = ObjectRecord()

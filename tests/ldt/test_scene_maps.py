@@ -7,8 +7,8 @@ import pytest
 import ldtrefl
 from ldtrefl.device import launch
 from ldtrefl.device.stats import Stats
-from ldtrefl.ldt.options import DEFAULT_RESOLUTION
-from ldtrefl.ldt.scene_maps import RESOLUTIONS_KEPT, MapOptions, SceneMaps
+from ldtrefl.ldt.options import DEFAULT_RESOLUTION, Quality
+from ldtrefl.ldt.scene_maps import RESOLUTIONS_KEPT, MapKey, MapOptions, SceneMaps
 from ldtrefl.world.device_scene import DeviceScene
 
 OPTIONS = MapOptions(search="exact", quality="balanced", linear_steps="texel", binary_steps=8, resolution=64)
@@ -36,17 +36,32 @@ def test_the_resolutions_used_last_are_kept(scene: DeviceScene) -> None:
         maps.chosen = {mesh: resolution}
         maps.bound(scene, {0}, stats)
     maps.drop_old_maps()
-    assert [resolution for _, resolution, _ in maps._maps] == list(range(18, 18 + RESOLUTIONS_KEPT))
+    assert [key.resolution for key in maps._maps] == list(range(18, 18 + RESOLUTIONS_KEPT))
     assert stats.counters["objects_peeled"] == RESOLUTIONS_KEPT + 2
 
 
 def test_coarser_maps_are_trusted_and_finer_ones_are_not_searched_exactly(scene: DeviceScene) -> None:
     maps, mesh = SceneMaps(OPTIONS), scene.objects[0].geometry
-    for chosen, key in ((32, (mesh, 32, True)), (64, (mesh, 64, False)), (128, (mesh, 64, False))):
+    for chosen, resolution, trusted in ((32, 32, True), (64, 64, False), (128, 64, False)):
         maps.chosen = {mesh: chosen}
         maps.bound(scene, {0}, Stats())
-        assert key in maps._maps
+        assert MapKey(mesh, resolution, "balanced", trusted) in maps._maps
     assert len(maps._maps) == 2
+
+
+@pytest.mark.parametrize("quality", ["balanced", "fast"])
+def test_a_mirror_is_searched_for_triangle_by_triangle(quality: Quality) -> None:
+    """Of a fine knot patches stand for the triangles, but not where rays leave it, nor where it is seen as a mirror."""
+    camera = ldtrefl.Camera(eye=(0, -9, 0), look_at=(0, 0, 0), width=4, height=4)
+    fine = {"segments": [3000, 60]}
+    for material, has_patches in ((ldtrefl.Material(), True), (ldtrefl.Material(mirror=0.5), False)):
+        knot = ldtrefl.Object(shape="torus_knot", params=fine, material=material)
+        scene = DeviceScene(ldtrefl.Scene(camera=camera, objects=(knot,)), launch.resolve_device(None))
+        maps = SceneMaps(dataclasses.replace(OPTIONS, quality=quality))
+        maps.chosen = {scene.objects[0].geometry: 32}  # coarse maps, where patches would stand for most
+        maps.bound(scene, {0}, Stats())
+        (texture,) = maps._maps.values()
+        assert texture.tree.patches == has_patches
 
 
 def test_objects_share_the_maps_of_their_mesh_and_those_without_need_none() -> None:
@@ -66,11 +81,18 @@ def test_what_was_peeled_for_other_frames_has_no_part_in_this_one(scene: DeviceS
     usual = maps.bound(scene, {0}, Stats())
     maps.chosen = {mesh: 32}
     coarse = maps.bound(scene, {0}, Stats())
-    assert coarse is not usual and maps._bound is not None and maps._bound.maps[mesh] is maps._maps[mesh, 32, True]
+    assert (
+        coarse is not usual
+        and maps._bound is not None
+        and maps._bound.maps[mesh] is maps._maps[MapKey(mesh, 32, "balanced", True)]
+    )
     maps.chosen = {}
     stats = Stats()
     maps.bound(scene, {0}, stats)
-    assert maps._bound.maps[mesh] is maps._maps[mesh, 64, False] and "objects_peeled" not in stats.counters
+    assert (
+        maps._bound.maps[mesh] is maps._maps[MapKey(mesh, 64, "balanced", False)]
+        and "objects_peeled" not in stats.counters
+    )
     # At a resolution that has not been peeled, and for rays that cannot meet it, the object is bound without maps.
     maps.chosen = {mesh: 16}
     maps.bound(scene, {1}, stats)

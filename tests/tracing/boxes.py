@@ -28,6 +28,7 @@ def rays_of(scene: DeviceScene, origins: np.ndarray, directions: np.ndarray, sou
     rays.origin = wp.array(starts, dtype=wp.vec3d, device=scene.device)
     rays.direction = wp.array(directions.astype(np.float32), dtype=wp.vec3, device=scene.device)
     rays.source = wp.array(source.astype(np.int32), dtype=wp.int32, device=scene.device)
+    rays.may_return.zero_()
     return rays
 
 

@@ -9,12 +9,14 @@ import warp as wp
 import ldtrefl
 from ldtrefl.device import launch
 from ldtrefl.device.stats import Stats
+from ldtrefl.ldt.scene_maps import MapOptions, SceneMaps
+from ldtrefl.scene import shapes
 from ldtrefl.scene.description import Camera, Material, Object, Scene
 from ldtrefl.tracing.closest_hits import closest_hits_kernel
 from ldtrefl.tracing.object_sets import ObjectSets, bits_of, sets_of_runs
 from ldtrefl.tracing.ray_buffers import HitBuffer, RayBuffer, empty_hits
 from ldtrefl.tracing.scene_bvh import SceneBvh
-from ldtrefl.tracing.tracer import block_of
+from ldtrefl.tracing.tracer import SceneTracer, block_of
 from ldtrefl.world.device_scene import DeviceScene
 from tests.tracing.boxes import HALF, distances, rays_of, scene_of
 
@@ -22,14 +24,21 @@ BOXES = 70
 """Three words of bits, the last one short."""
 
 
-def found(scene: DeviceScene, rays: RayBuffer, sets: ObjectSets | None = None, *, bounds: bool = True) -> HitBuffer:
-    """Where rays end by ray casting."""
-    bvhs, count = SceneBvh(), rays.source.shape[0]
+def found(
+    scene: DeviceScene,
+    rays: RayBuffer,
+    sets: ObjectSets | None = None,
+    *,
+    bounds: bool = True,
+    tracer: SceneTracer | None = None,
+) -> HitBuffer:
+    """Where rays end, by ray casting if no tracer is given."""
+    count = rays.source.shape[0]
     hits, block = empty_hits(count, scene.device), block_of(scene.device)
-    tracer = bvhs.bound(scene, set(range(len(scene.objects))), Stats())
+    bound = (tracer or SceneBvh()).bound(scene, set(range(len(scene.objects))), Stats())
     sets = sets or sets_of_runs(wp.empty((0, 0), dtype=wp.uint32, device=scene.device))
-    kernel = closest_hits_kernel(tracer.tracer, block, bounds)
-    launch.launch(kernel, -(-count // block), [rays, scene.records, tracer.views, sets, hits], scene.device)
+    kernel = closest_hits_kernel(bound.tracer, block, bounds)
+    launch.launch(kernel, -(-count // block), [rays, scene.records, bound.views, sets, hits], scene.device)
     return hits
 
 
@@ -94,6 +103,60 @@ def test_of_objects_in_one_place_the_first_is_met(bounds: bool) -> None:
     source = np.arange(count) % 5
     hits = found(scene, rays_of(scene, origins, directions, source), bounds=bounds)
     assert hits.object.numpy().tolist() == np.where(source == 0, 1, 0).tolist()
+
+
+def brute_force(mesh: ldtrefl.Mesh, origins: np.ndarray, directions: np.ndarray, own: np.ndarray) -> np.ndarray:
+    """(n,) distance in float64 to the first triangle of a mesh but its own, by Moeller and Trumbore."""
+    a, b, c = mesh.vertices[mesh.faces].transpose(1, 0, 2)
+    nearest = np.full(len(origins), np.inf)
+    for i, (origin, direction) in enumerate(zip(origins, directions, strict=True)):
+        p = np.cross(direction, c - a)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            inverse = 1.0 / ((b - a) * p).sum(axis=1)
+            u = ((origin - a) * p).sum(axis=1) * inverse
+            q = np.cross(origin - a, b - a)
+            v, t = (q @ direction) * inverse, ((c - a) * q).sum(axis=1) * inverse
+        is_met = (u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0)
+        is_met[own[i]] = False
+        nearest[i] = t[is_met].min(initial=np.inf)
+    return nearest
+
+
+@pytest.mark.parametrize("tracer", ["bvh", "exact", "linear"])
+@pytest.mark.parametrize("size", [1e-4, 1.0, 1e4])
+def test_rays_meet_the_object_that_they_leave_where_brute_force_says(tracer: str, size: float) -> None:
+    """Half the rays leave a coarse torus to its outside, half to its inside; none meets the triangle that it leaves."""
+    mesh, rng, count = shapes.make("torus", {"segments": [24, 12]}), np.random.default_rng(4), 600
+    own = rng.integers(0, len(mesh.faces), count)
+    corners = mesh.vertices[mesh.faces[own]]
+    points = (rng.dirichlet((2, 2, 2), count)[:, :, None] * corners).sum(axis=1)
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    ways = rng.normal(size=(count, 3))
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    expected = brute_force(mesh, points, ways, own)
+    assert 300 < np.isfinite(expected).sum() < 580
+
+    camera = Camera(eye=(0, -9 * size, 0), look_at=(0, 0, 0), width=4, height=4)
+    ring = Object(mesh=mesh, scale=size, translate=(2 * size, 0, 0), material=Material(mirror=1.0))
+    far = Object(shape="box", scale=0.1 * size, translate=(-40 * size, 0, 0))
+    scene = DeviceScene(Scene(camera=camera, objects=(ring, far)), launch.resolve_device(None))
+    rays = rays_of(scene, points * size + [2 * size, 0, 0], ways, np.zeros(count))
+    rays.source_triangle = wp.array(own.astype(np.int32), dtype=wp.int32, device=scene.device)
+    rays.may_return.fill_(1)
+    options = MapOptions(tracer, "balanced", "texel", 8, 256)
+    hits = found(scene, rays, tracer=SceneBvh() if tracer == "bvh" else SceneMaps(options))
+    t, met = hits.t.numpy() / scene.device_units_per_world_unit / size, np.isfinite(expected)
+    if tracer == "linear":  # to a texel, and not what lies nearer than it starts above its surface
+        clear = expected > 0.2
+        agrees = np.isclose(t, expected, atol=0.03)  # infinity is close to infinity
+        assert agrees[clear].mean() > 0.85
+        return
+    np.testing.assert_array_equal(np.isfinite(t), met)
+    np.testing.assert_allclose(t[met], expected[met], rtol=1e-4, atol=1e-4)
+    assert (hits.triangle.numpy()[met] != own[met]).all()
+    rays.may_return.zero_()
+    assert np.isinf(found(scene, rays).t.numpy()).all(), "a ray that cannot come back is not searched for"
 
 
 @pytest.mark.parametrize("objects", [10, 40])

@@ -196,11 +196,18 @@ def closest_hit_linear(views: wp.array(dtype=MapsView), index: int, query: Query
 
 
 @wp.func
+def leaving_linear(views: wp.array(dtype=MapsView), index: int, query: Query, outwards: wp.vec3) -> Query:
+    """The tracer's ``leaving``."""
+    above = query
+    above.origin = query.origin + as_double((CLEARANCE / views[index].texels_per_unit) * outwards)
+    return above
+
+
+@wp.func
 def occluded_linear(views: wp.array(dtype=MapsView), index: int, query: Query, outwards: wp.vec3) -> bool:
     """The tracer's ``occluded`` by :func:`march_linear`."""
     scale = views[index].texels_per_unit
-    above = query
-    above.origin = query.origin + as_double((CLEARANCE / scale) * outwards)
+    above = leaving_linear(views, index, query, outwards)
     passed = distance_to_near(above)
     origin = scale * as_single(point_along(above.origin, above.direction, passed)) + views[index].texel_offset
     return march_linear(views, index, origin, scale * above.direction, above.t_max - passed, True).fragment >= 0
@@ -224,4 +231,4 @@ def any_hits_linear(
         hits[i].triangle = wp.where(occluded_linear(views, index, queries[i], wp.vec3(0.0)), 0, -1)
 
 
-LINEAR = Tracer("linear", MapsView, closest_hits_linear, any_hits_linear, occluded_linear)
+LINEAR = Tracer("linear", MapsView, closest_hits_linear, any_hits_linear, occluded_linear, leaving_linear)
