@@ -92,7 +92,7 @@ def shade_hits_kernel(tracer: Tracer) -> wp.Kernel:
         surface = hit_surface(objects, rays, hits, i)
         light = direct_radiance(views, objects, lighting, surface)
         if wp.max(surface.mirror) > 0.0:
-            direction = mirror_direction(rays.direction[i], surface.normal)
+            direction = mirror_direction(rays.direction[i], surface.normal, surface.facet)
             onwards = wp.cw_mul(throughput, surface.mirror)
             if wp.max(onwards) < least_weight:
                 light += wp.cw_mul(surface.mirror, environment_radiance(lighting, direction))

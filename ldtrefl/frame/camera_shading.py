@@ -47,7 +47,7 @@ def shade_pixels_kernel(tracer: Tracer) -> wp.Kernel:
 def start_ray(rays: RayBuffer, i: int, objects: wp.array(dtype=ObjectRecord), surface: Surface, direction: wp.vec3):
     """Start ray ``i`` at a surface that is seen along unit ``direction``, in the mirrored direction."""
     rays.origin[i] = surface.position
-    rays.direction[i] = mirror_direction(direction, surface.normal)
+    rays.direction[i] = mirror_direction(direction, surface.normal, surface.facet)
     rays.throughput[i] = wp.vec3(1.0)
     rays.source[i] = surface.object
     rays.source_triangle[i] = surface.triangle
