@@ -33,6 +33,7 @@ from ldtrefl.tracing.object_sets import ObjectSets
 from ldtrefl.tracing.ray_buffers import HitBuffer, RayBuffer, empty_hits, empty_rays
 from ldtrefl.tracing.tracer import BoundTracer, Tracer, block_of
 from ldtrefl.world.records import LightingRecord, ObjectRecord
+from ldtrefl.world.top_level import TopLevel
 
 FARTHER = wp.constant(64.0)
 """Where a ray has come from more than this many of an object's radii away, its hit is placed by its barycentrics: along
@@ -67,6 +68,7 @@ def shade_hits_kernel(tracer: Tracer) -> wp.Kernel:
         rays: RayBuffer,
         hits: HitBuffer,
         objects: wp.array(dtype=ObjectRecord),
+        top: TopLevel,
         lighting: LightingRecord,
         views: wp.array(dtype=tracer.view),
         numbers: wp.array(dtype=wp.int32),  # of the rays among the first bounce's; empty: they are those
@@ -90,7 +92,7 @@ def shade_hits_kernel(tracer: Tracer) -> wp.Kernel:
             radiance[number] = radiance[number] + wp.cw_mul(throughput, brought)
             return
         surface = hit_surface(objects, rays, hits, i)
-        light = direct_radiance(views, objects, lighting, surface)
+        light = direct_radiance(views, objects, top, lighting, surface)
         if wp.max(surface.mirror) > 0.0:
             direction = mirror_direction(rays.direction[i], surface.normal, surface.facet)
             onwards = wp.cw_mul(throughput, surface.mirror)
@@ -246,8 +248,8 @@ class RayFollower:
             shadow, onwards = tracer if scene.lighting.shadows else no_shadows(device), empty_rays(count, device)
             places = wp.array(np.empty(0, np.int32) if numbers is None else numbers, dtype=wp.int32, device=device)
             weight = np.inf if is_last else self.limits.least_weight
-            inputs = [rays, hits, scene.records, scene.lighting, shadow.views, places, weight, radiance, onwards]
-            launch.launch(shade_hits_kernel(shadow.tracer), count, inputs, device)
+            inputs = [rays, hits, scene.records, scene.top_level, scene.lighting, shadow.views, places, weight]
+            launch.launch(shade_hits_kernel(shadow.tracer), count, [*inputs, radiance, onwards], device)
         return hits, onwards
 
     def _needed(self, regions: Regions) -> set[int]:

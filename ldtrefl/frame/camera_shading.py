@@ -14,6 +14,7 @@ from ldtrefl.tracing.nothing import no_shadows
 from ldtrefl.tracing.ray_buffers import RayBuffer, empty_rays
 from ldtrefl.tracing.tracer import BoundTracer, Tracer
 from ldtrefl.world.records import LightingRecord, ObjectRecord
+from ldtrefl.world.top_level import TopLevel
 
 
 @launch.once
@@ -27,6 +28,7 @@ def shade_pixels_kernel(tracer: Tracer) -> wp.Kernel:
         # In:
         gbuffer: GBufferView,
         objects: wp.array(dtype=ObjectRecord),
+        top: TopLevel,
         lighting: LightingRecord,
         views: wp.array(dtype=tracer.view),
         # Out:
@@ -38,7 +40,7 @@ def shade_pixels_kernel(tracer: Tracer) -> wp.Kernel:
             radiance_out[i] = environment_radiance(lighting, wp.normalize(pixel_ray(gbuffer, i)))
         elif gbuffer.reflector[i] == wp.uint8(0):
             surface = pixel_surface(gbuffer, objects, i, pixel_view(gbuffer, objects, i))
-            radiance_out[i] = direct_radiance(views, objects, lighting, surface)
+            radiance_out[i] = direct_radiance(views, objects, top, lighting, surface)
 
     return shade_pixels
 
@@ -67,6 +69,7 @@ def shade_reflectors_kernel(tracer: Tracer, starts_rays: bool) -> wp.Kernel:
         pixels: wp.array(dtype=wp.int32),
         gbuffer: GBufferView,
         objects: wp.array(dtype=ObjectRecord),
+        top: TopLevel,
         lighting: LightingRecord,
         views: wp.array(dtype=tracer.view),
         # Out:
@@ -79,7 +82,7 @@ def shade_reflectors_kernel(tracer: Tracer, starts_rays: bool) -> wp.Kernel:
         pixel = pixels[i]
         view = pixel_view(gbuffer, objects, pixel)
         surface = pixel_surface(gbuffer, objects, pixel, view)
-        radiance_out[pixel] = direct_radiance(views, objects, lighting, surface)
+        radiance_out[pixel] = direct_radiance(views, objects, top, lighting, surface)
         mirror_out[i] = surface.mirror
         if with_rays:
             rays.pixel[i] = pixel
@@ -107,7 +110,7 @@ def shade_gbuffer(
     scene, device = gbuffer.scene, gbuffer.scene.device
     if radiance is None or radiance.shape[0] != gbuffer.pixel_count:
         radiance = wp.empty(gbuffer.pixel_count, dtype=wp.vec3, device=device)
-    inputs = [gbuffer.view, scene.records, scene.lighting, shadow.views]
+    inputs = [gbuffer.view, scene.records, scene.top_level, scene.lighting, shadow.views]
     launch.launch(shade_pixels_kernel(shadow.tracer), gbuffer.pixel_count, [*inputs, radiance], device)
     return _with_reflectors(gbuffer, shadow, radiance, starts_rays=starts_rays)
 
@@ -124,6 +127,7 @@ def _with_reflectors(gbuffer: GBuffer, shadow: BoundTracer, radiance: wp.array, 
     scene, device, pixels = gbuffer.scene, gbuffer.scene.device, gbuffer.reflector_pixels
     count = pixels.shape[0]
     mirror, rays = wp.empty(count, dtype=wp.vec3, device=device), empty_rays(count if starts_rays else 0, device)
-    inputs = [pixels, gbuffer.view, scene.records, scene.lighting, shadow.views, rays, radiance, mirror]
-    launch.launch(shade_reflectors_kernel(shadow.tracer, starts_rays), count, inputs, device)
+    inputs = [pixels, gbuffer.view, scene.records, scene.top_level, scene.lighting, shadow.views]
+    kernel = shade_reflectors_kernel(shadow.tracer, starts_rays)
+    launch.launch(kernel, count, [*inputs, rays, radiance, mirror], device)
     return Shaded(radiance, mirror, rays)

@@ -11,14 +11,17 @@ All in device space.
 
 from __future__ import annotations
 
+import numpy as np
 import warp as wp
 
+from ldtrefl.base import budget
 from ldtrefl.device import launch
 from ldtrefl.device.stats import Stats
 from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.regions import Regions
+from ldtrefl.frame.run_lists import RunLists, listed, set_entry
 from ldtrefl.geometry.vectors import as_double, from_to
-from ldtrefl.tracing.object_sets import ObjectSets, objects_in, word_count
+from ldtrefl.tracing.object_sets import RUN, run_count
 from ldtrefl.tracing.ray_buffers import RayBuffer
 from ldtrefl.world.records import ObjectRecord
 
@@ -118,34 +121,61 @@ def cull_triangles(
 
 
 @launch.kernel
-def find_rows(
+def list_shown(
     first: int,
     # In:
     rays: RayBuffer,
+    objects: int,
+    bits: wp.array2d(dtype=wp.uint32),
     pixel_triangle: wp.array(dtype=wp.int32),
     first_rows: wp.array(dtype=wp.int32),
-    # Out:
-    rows_out: wp.array(dtype=wp.int32),
+    room: int,
+    # In and out:
+    lists: RunLists,
+    # Out, whoever writes it: 1 for objects that are listed
+    shown_out: wp.array(dtype=wp.uint8),
 ):
-    """Find the row of bits of one ray: that of the triangle which its pixel sees."""
-    i = first + wp.tid()
-    rows_out[i] = first_rows[rays.source[i]] + pixel_triangle[rays.pixel[i]]
+    """List the objects that the triangles which the rays of one run leave can show."""
+    run = first + wp.tid()
+    begin, end = RUN * run, wp.min(RUN * run + RUN, rays.source.shape[0])
+    found = int(0)
+    for k in range(objects):
+        met = wp.uint64(0)
+        for i in range(begin, end):
+            row = first_rows[rays.source[i]] + pixel_triangle[rays.pixel[i]]
+            if (bits[row, k / 32] >> wp.uint32(k % 32)) & wp.uint32(1) != wp.uint32(0):
+                if rays.source[i] != k or rays.may_return[i] != wp.uint8(0):
+                    met = met | (wp.uint64(1) << wp.uint64(i - begin))
+        if met != wp.uint64(0):
+            shown_out[k] = wp.uint8(1)
+            if found < room:
+                set_entry(lists, lists.start[run] + found, k, met, 0.0)
+            found += 1
+    lists.count[run] = found
 
 
 def flat_regions(gbuffer: GBuffer, rays: RayBuffer, stats: Stats) -> Regions:
-    """Test the triangles of all reflectors for the rays of the first bounce. Counts what ``safe_regions`` counts."""
+    """Test the triangles of all reflectors for the rays of the first bounce. Counts what ``safe_regions`` counts.
+
+    Raises:
+        InputError: a bit for each triangle and object needs more memory than is allowed.
+    """
     scene, device, count = gbuffer.scene, gbuffer.scene.device, len(gbuffer.scene.objects)
     first_rows, total = scene.reflector_rows
-    sets = ObjectSets()
-    sets.bits = wp.zeros((total, word_count(count)), dtype=wp.uint32, device=device)
+    words = -(-count // 32)
+    budget.take(4 * total * words, f"cull=flat of {total} triangles and {count} objects", "their number, or cull=safe")
+    bits = wp.zeros((total, words), dtype=wp.uint32, device=device)
     for entry, first_row in zip(scene.objects, first_rows.numpy().tolist(), strict=True):
         if entry.source.is_reflector:
-            inputs = [scene.records, entry.index, first_row, gbuffer.view.camera.eye, sets.bits]
+            inputs = [scene.records, entry.index, first_row, gbuffer.view.camera.eye, bits]
             launch.launch(cull_triangles, len(entry.geometry.faces), inputs, device)
-    n = rays.source.shape[0]
-    sets.rows = wp.empty(n, dtype=wp.int32, device=device)
-    launch.launch(find_rows, n, [rays, gbuffer.view.triangle, first_rows, sets.rows], device)
-    table = sets.bits.numpy()
+    shown = wp.zeros(count, dtype=wp.uint8, device=device)
+
+    def fill(lists: RunLists, room: int) -> None:
+        inputs = [rays, count, bits, gbuffer.view.triangle, first_rows, room, lists, shown]
+        launch.launch(list_shown, lists.start.shape[0], inputs, device)
+
+    sets = listed(run_count(rays.source.shape[0]), count, device, fill)
     stats.count("triangles_tested", total)
-    stats.count("triangles_culled", int((~table.any(axis=1)).sum()))
-    return Regions(sets, objects_in(table[sets.rows.numpy()], count))
+    stats.count("triangles_culled", int((~bits.numpy().any(axis=1)).sum()))
+    return Regions(sets, set(np.flatnonzero(shown.numpy()).tolist()))

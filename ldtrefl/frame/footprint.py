@@ -15,7 +15,7 @@ import numpy as np
 from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.pixel_order import BLOCK
 from ldtrefl.frame.regions import Regions
-from ldtrefl.tracing.object_sets import rays_of, run_count
+from ldtrefl.tracing.object_sets import entries, rays_of, run_count
 from ldtrefl.tracing.ray_buffers import RayBuffer, distance_across
 from ldtrefl.world.device_object import DeviceObject
 
@@ -102,9 +102,9 @@ def finest_footprints(gbuffer: GBuffer, rays: RayBuffer, regions: Regions, *, is
         regions: which objects they can meet; the others are left out.
         is_seen: whether what the camera itself sees counts, too; then no object is left out.
     """
-    bits = regions.sets.bits.numpy()
-    by_runs = len(bits) > 0 and regions.sets.rows.shape[0] == 0
     every_run = np.arange(run_count(rays.pixel.shape[0]))
+    are_listed = regions.sets.start.shape[0] > 0
+    listed_runs, listed_objects = entries(regions.sets) if are_listed else (every_run, every_run)
     spacing = pixel_spacing(gbuffer) if is_seen else None
     arrays = RayArrays.of(rays)
     finest: dict[int, float | None] = {}
@@ -114,7 +114,7 @@ def finest_footprints(gbuffer: GBuffer, rays: RayBuffer, regions: Regions, *, is
             continue
         apart = [spacing]
         if is_shown:
-            runs = np.flatnonzero(bits[:, entry.index // 32] >> entry.index % 32 & 1) if by_runs else every_run
+            runs = listed_runs[listed_objects == entry.index] if are_listed else every_run
             apart.append(footprint(arrays, gbuffer.camera.width, runs, entry))
         finest[entry.index] = min((distance for distance in apart if distance is not None), default=None)
     return finest

@@ -16,7 +16,7 @@ from ldtrefl.device.launch import kernel, launch
 from ldtrefl.frame.bounces import FollowedRays, LaterBounce, RayFollower
 from ldtrefl.frame.regions import Regions
 from ldtrefl.frame.taken_rays import taken
-from ldtrefl.tracing.object_sets import RUN, bits_of, rays_of, sets_of_runs
+from ldtrefl.tracing.object_sets import RUN, ObjectSets, object_listed, rays_of, sets_for_runs
 from ldtrefl.tracing.ray_buffers import HitBuffer, RayBuffer, cloned, copy_hit
 
 
@@ -26,9 +26,9 @@ def find_changed_runs(
     # In:
     rays: RayBuffer,
     before: RayBuffer,
-    bits: wp.array2d(dtype=wp.uint32),
-    bits_before: wp.array2d(dtype=wp.uint32),
-    moved: wp.array(dtype=wp.uint32),
+    sets: ObjectSets,
+    sets_before: ObjectSets,
+    moved: wp.array(dtype=wp.uint8),  # 1 for the objects that have
     source_onwards: wp.array(dtype=wp.int32),  # of the rays before, after their first bounce
     # Out:
     changed_out: wp.array(dtype=wp.uint8),
@@ -36,9 +36,10 @@ def find_changed_runs(
     """Find out whether one run has changed."""
     run = first + wp.tid()
     changed = bool(False)
-    for word in range(moved.shape[0]):
-        seen = bits[run, word] | bits_before[run, word]
-        changed = changed or (seen & moved[word]) != wp.uint32(0)
+    for entry in range(sets.count[run]):
+        changed = changed or moved[object_listed(sets, run, entry)] != wp.uint8(0)
+    for entry in range(sets_before.count[run]):
+        changed = changed or moved[object_listed(sets_before, run, entry)] != wp.uint8(0)
     i = int(RUN * run)
     while i < wp.min(RUN * run + RUN, rays.source.shape[0]) and not changed:
         same = rays.source[i] == before.source[i] and rays.origin[i] == before.origin[i]
@@ -67,18 +68,22 @@ def put_back(
     source_onwards_out[numbers[i]] = part_source_onwards[i]
 
 
-def changed_runs(before: FollowedRays, rays: RayBuffer, regions: Regions, moved: Set[int]) -> np.ndarray | None:
+def changed_runs(
+    before: FollowedRays, rays: RayBuffer, regions: Regions, moved: Set[int], objects: int
+) -> np.ndarray | None:
     """(m,) numbers of the runs that must be followed again; None if nothing is known: other pixels see reflectors, or
     the rays were not culled by runs."""
     sets = regions.sets
-    if sets.bits.shape[1] == 0 or sets.rows.shape[0] or sets.bits.shape != before.sets.bits.shape:
+    runs = sets.start.shape[0]
+    if runs == 0 or runs != before.sets.start.shape[0]:
         return None
     if not np.array_equal(rays.pixel.numpy(), before.rays.pixel.numpy()):
         return None
-    device, runs = rays.pixel.device, sets.bits.shape[0]
-    moved_bits = wp.array(bits_of(moved, 32 * sets.bits.shape[1]), dtype=wp.uint32, device=device)
+    device, has_moved = rays.pixel.device, np.zeros(objects, np.uint8)
+    has_moved[sorted(moved)] = 1
     flags = wp.empty(runs, dtype=wp.uint8, device=device)
-    inputs = [rays, before.rays, sets.bits, before.sets.bits, moved_bits, before.source_onwards, flags]
+    inputs = [rays, before.rays, sets, before.sets, wp.array(has_moved, dtype=wp.uint8, device=device)]
+    inputs += [before.source_onwards, flags]
     launch(find_changed_runs, runs, inputs, device)
     return np.flatnonzero(flags.numpy())
 
@@ -98,8 +103,7 @@ def follow_changed(
     later: tuple[LaterBounce, ...] = ()  # what was mirrored again is followed again
     if count:
         part, chosen = taken(rays, numbers), wp.array(numbers.astype(np.int32), dtype=wp.int32, device=device)
-        bits = wp.array(regions.sets.bits.numpy()[runs], dtype=wp.uint32, device=device)
-        again = follower.follow(part, Regions(sets_of_runs(bits), regions.shown))
+        again = follower.follow(part, Regions(sets_for_runs(regions.sets, runs), regions.shown))
         inputs = [chosen, again.hits, again.radiance, again.source_onwards, hits, radiance, source_onwards]
         launch(put_back, count, inputs, device)
         later = tuple(LaterBounce(numbers[bounce.numbers], bounce.hits) for bounce in again.later)

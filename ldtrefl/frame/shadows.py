@@ -12,6 +12,7 @@ from ldtrefl.shading.surface import Surface
 from ldtrefl.tracing.nothing import NOTHING
 from ldtrefl.tracing.tracer import Query, Tracer
 from ldtrefl.world.records import ObjectRecord
+from ldtrefl.world.top_level import STACK, TopLevel
 from ldtrefl.world.unit_rays import into_unit, start_above, start_above_own, unit_normal
 
 
@@ -49,22 +50,36 @@ def direct_radiance_of(tracer: Tracer) -> Callable[..., wp.vec3]:
     def is_lit(
         views: Any,
         objects: wp.array(dtype=ObjectRecord),
+        top: TopLevel,
         surface: Surface,
         towards: wp.vec3,
         distance: float,
     ) -> bool:
-        for k in range(objects.shape[0]):
-            entry = sphere_entry(surface.position, towards, objects[k].centre, objects[k].radius)
-            if entry >= 0.0 and entry < distance:
-                shadow = shadow_ray(objects[k], surface, towards, distance, k == surface.object)
-                if is_occluded(views, k, shadow.query, shadow.outwards):
-                    return False
+        nodes = wp.zeros(shape=STACK, dtype=wp.int32)
+        nodes[0] = top.root
+        waiting = int(1)
+        while waiting > 0:
+            waiting -= 1
+            node = top.nodes[nodes[waiting]]
+            for number in range(node.first, node.first + node.count):
+                child = top.nodes[number]
+                entry = sphere_entry(surface.position, towards, child.centre, child.radius)
+                if entry >= 0.0 and entry < distance:
+                    if child.count > 0:
+                        nodes[waiting] = number
+                        waiting += 1
+                    else:
+                        k = child.first
+                        shadow = shadow_ray(objects[k], surface, towards, distance, k == surface.object)
+                        if is_occluded(views, k, shadow.query, shadow.outwards):
+                            return False
         return True
 
     @wp.func
     def always_lit(
         views: Any,
         objects: wp.array(dtype=ObjectRecord),
+        top: TopLevel,
         surface: Surface,
         towards: wp.vec3,
         distance: float,

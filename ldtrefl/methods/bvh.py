@@ -17,7 +17,7 @@ from ldtrefl.frame.first_hits import FirstHits
 from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.history import Reusable
 from ldtrefl.frame.reflected_light import ReflectedLight
-from ldtrefl.frame.regions import Regions, all_objects
+from ldtrefl.frame.regions import FEW_OBJECTS, Regions, all_objects, safe_regions
 from ldtrefl.methods.base import RayConfig, RayMethod
 from ldtrefl.tracing.ray_buffers import RayBuffer
 from ldtrefl.tracing.tracer import BoundTracer
@@ -41,7 +41,9 @@ class Bvh(RayMethod):
         return ReflectedLight(summed_by_pixel(gbuffer.reflector_pixels, rays, followed.radiance), hits)
 
     def regions(self, gbuffer: GBuffer, rays: RayBuffer, bounce: int, stats: Stats) -> Regions:
-        """Every ray may meet every object."""
+        """Every ray may meet every object; of many, what it cannot meet is left out."""
+        if len(self.scene.objects) > FEW_OBJECTS:
+            return safe_regions(gbuffer, rays, bounce, stats)
         return all_objects(self.scene, rays)
 
     def traced(self, objects: set[int], stats: Stats) -> BoundTracer:

@@ -31,7 +31,7 @@ from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.history import Reusable
 from ldtrefl.frame.reflected_light import ReflectedLight
 from ldtrefl.frame.refollow import changed_runs, follow_changed
-from ldtrefl.frame.regions import Regions, all_objects, objects_that_rays_meet, safe_regions
+from ldtrefl.frame.regions import FEW_OBJECTS, Regions, all_objects, objects_that_rays_meet, safe_regions
 from ldtrefl.ldt.options import (
     BINARY_STEPS,
     DEFAULT_QUALITY,
@@ -49,10 +49,6 @@ from ldtrefl.tracing.ray_buffers import RayBuffer
 from ldtrefl.tracing.tracer import BoundTracer, SceneTracer
 from ldtrefl.world.device_mesh import DeviceMesh
 from ldtrefl.world.device_scene import DeviceScene
-
-FEW_OBJECTS = 8
-"""Up to this many objects culling costs as much as it saves: 4% more time than without it
-with two to five objects, 11% less with fifty."""
 
 
 class Ldt(RayMethod):
@@ -155,7 +151,7 @@ class Ldt(RayMethod):
             return None
         before = reusable.reflected.followed
         with follower.stats.stage("cull", self.scene.device):
-            runs = changed_runs(before, rays, regions, reusable.moved)
+            runs = changed_runs(before, rays, regions, reusable.moved, len(self.scene.objects))
         return None if runs is None else follow_changed(follower, before, rays, regions, runs)
 
     @property

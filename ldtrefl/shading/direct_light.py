@@ -14,6 +14,7 @@ import warp as wp
 from ldtrefl.geometry.vectors import from_to
 from ldtrefl.shading.surface import Surface
 from ldtrefl.world.records import LightingRecord, ObjectRecord
+from ldtrefl.world.top_level import TopLevel
 
 SMALLEST_SQUARE = wp.constant(1.0e-36)
 """The least squared distance that a point light's intensity is divided by: in the surface itself that would be 0."""
@@ -29,15 +30,19 @@ def at_most_largest(radiance: wp.vec3) -> wp.vec3:
 
 
 def make_direct_radiance(is_lit: Callable[..., bool]) -> Callable[..., wp.vec3]:
-    """The function ``direct_radiance(views, objects, lighting, surface)`` -> emitted and diffusely scattered radiance.
+    """``direct_radiance(views, objects, top, lighting, surface)``: emitted and diffusely scattered radiance.
 
-    ``is_lit(views, objects, surface, direction, distance)`` answers whether light arrives from unit ``direction``, from
-    a light at ``distance``; it closes over a tracer, so shadows exist once for all tracers.
+    ``is_lit(views, objects, top, surface, direction, distance)`` answers whether light arrives from unit ``direction``,
+    from a light at ``distance``; it closes over a tracer, so shadows exist once for all tracers.
     """
 
     @wp.func
     def direct_radiance(
-        views: Any, objects: wp.array(dtype=ObjectRecord), lighting: LightingRecord, surface: Surface
+        views: Any,
+        objects: wp.array(dtype=ObjectRecord),
+        top: TopLevel,
+        lighting: LightingRecord,
+        surface: Surface,
     ) -> wp.vec3:
         total = lighting.ambient
         for i in range(lighting.lights.shape[0]):
@@ -51,7 +56,7 @@ def make_direct_radiance(is_lit: Callable[..., bool]) -> Callable[..., wp.vec3]:
                 radiance = at_most_largest(radiance / wp.max(distance * distance, SMALLEST_SQUARE))
             cosine = wp.dot(surface.normal, towards)
             if cosine > 0.0:
-                if is_lit(views, objects, surface, towards, distance):
+                if is_lit(views, objects, top, surface, towards, distance):
                     total += cosine * radiance
         return at_most_largest(surface.emission + wp.cw_mul(surface.albedo, total))
 

@@ -13,7 +13,7 @@ from ldtrefl.device import launch
 from ldtrefl.geometry.sphere import meets_sphere, sphere_entry
 from ldtrefl.geometry.vectors import as_single
 from ldtrefl.tracing.hit import Hit
-from ldtrefl.tracing.object_sets import ObjectSets, has_bit, lowest_bit, object_bits, without
+from ldtrefl.tracing.object_sets import RUN, ObjectSets, is_listed, lowest_bit, object_listed, objects_listed
 from ldtrefl.tracing.ray_buffers import HitBuffer, RayBuffer, keep_nearer, set_miss
 from ldtrefl.tracing.tracer import Query, Tracer
 from ldtrefl.world.records import ObjectRecord
@@ -24,38 +24,46 @@ BEYOND = wp.constant(1.000001)
 found, too, whatever way it is rounded."""
 
 
-@wp.func
-def objects_to_meet(
-    sets: ObjectSets, objects: wp.array(dtype=ObjectRecord), rays: RayBuffer, i: int, word: int
-) -> wp.uint32:
-    """The objects of a word that ray ``i`` can meet, a bit each: none if it is dead."""
-    source = rays.source[i]
-    if source < 0:
-        return wp.uint32(0)
-    bits = object_bits(sets, objects, i, word)
-    if source / 32 == word and rays.may_return[i] == wp.uint8(0):
-        bits = without(bits, source)
-    return bits
+GROUP = wp.constant(32)
+"""Objects of a run's list that are put in order together: as many as a word has bits."""
 
 
 @wp.func
 def first_entered(
-    objects: wp.array(dtype=ObjectRecord), bits: wp.uint32, word: int, origin: wp.vec3d, direction: wp.vec3
+    objects: wp.array(dtype=ObjectRecord),
+    sets: ObjectSets,
+    run: int,
+    begin: int,
+    left: wp.uint32,
+    origin: wp.vec3d,
+    direction: wp.vec3,
 ) -> int:
-    """The object of a word of bits whose bounding sphere a ray enters first; any of them if it enters none."""
-    first = 32 * word + lowest_bit(bits)
-    rest = without(bits, first)
-    if rest == wp.uint32(0):
-        return first
-    nearest = sphere_entry(origin, direction, objects[first].centre, objects[first].radius)
+    """Of the entries from ``begin`` on of a run's list that are left, a bit each, the one whose object a ray enters
+    first, by bounding spheres; any of them if it enters none."""
+    first = begin + lowest_bit(left)
+    rest = left & (left - wp.uint32(1))
+    nearest = float(-1.0)
+    if rest != wp.uint32(0):
+        k = object_listed(sets, run, first)
+        nearest = sphere_entry(origin, direction, objects[k].centre, objects[k].radius)
     while rest != wp.uint32(0):
-        k = 32 * word + lowest_bit(rest)
-        entry = sphere_entry(origin, direction, objects[k].centre, objects[k].radius)
-        if entry >= 0.0 and (entry < nearest or nearest < 0.0):
-            nearest = entry
-            first = k
-        rest = without(rest, k)
+        entry = begin + lowest_bit(rest)
+        k = object_listed(sets, run, entry)
+        entered = sphere_entry(origin, direction, objects[k].centre, objects[k].radius)
+        if entered >= 0.0 and (entered < nearest or nearest < 0.0):
+            nearest = entered
+            first = entry
+        rest = rest & (rest - wp.uint32(1))
     return first
+
+
+@wp.func
+def can_meet(sets: ObjectSets, rays: RayBuffer, run: int, entry: int, k: int, i: int) -> bool:
+    """Whether ray ``i`` is alive and can meet object ``k``, which is an entry of its run's list."""
+    source = rays.source[i]
+    if source < 0 or (source == k and rays.may_return[i] == wp.uint8(0)):
+        return False
+    return is_listed(sets, run, entry, i)
 
 
 @wp.func
@@ -135,7 +143,7 @@ def keep_found(
 @launch.once
 def closest_hits_kernel(tracer: Tracer, block: int, bounds: bool = True) -> wp.Kernel:
     """The kernel that finds where rays end; one item follows ``block`` rays. With ``bounds`` an object is searched only
-    for rays that enter its bounding sphere before their nearest hit so far; of 32 the first entered comes first."""
+    for rays that enter its sphere before their nearest hit so far; of a group the first entered comes first."""
     find_hits, searched_ray = tracer.closest_hits, searched_of(tracer)
     size, to_infinity = wp.constant(block), wp.constant(not bounds)
 
@@ -157,26 +165,24 @@ def closest_hits_kernel(tracer: Tracer, block: int, bounds: bool = True) -> wp.K
         queries = wp.array(ptr=query_memory.ptr, shape=(size,), dtype=Query)
         found = wp.array(ptr=hit_memory.ptr, shape=(size,), dtype=Hit)
         searched = wp.zeros(shape=size, dtype=SearchedRay)
-        to_meet = wp.zeros(shape=size, dtype=wp.uint32)  # of each ray, the objects of a word
         lead = int(-1)  # the first ray that is alive: objects are searched in the order in which it enters them
         for i in range(begin, end):
             set_miss(hits, i)
             if lead < 0 and rays.source[i] >= 0:
                 lead = i
-        words = wp.where(lead >= 0, (objects.shape[0] + 31) / 32, 0)
-        for word in range(words):
-            left = wp.uint32(0)
-            for i in range(begin, end):
-                to_meet[i - begin] = objects_to_meet(sets, objects, rays, i, word)
-                left = left | to_meet[i - begin]
+        run = begin / RUN
+        listed = wp.where(lead >= 0, objects_listed(sets, objects.shape[0], run), 0)
+        for group in range(0, listed, GROUP):
+            left = ~wp.uint32(0) >> wp.uint32(GROUP - wp.min(GROUP, listed - group))
             while left != wp.uint32(0):
-                k = first_entered(objects, left, word, rays.origin[lead], rays.direction[lead])
-                left = without(left, k)
+                entry = first_entered(objects, sets, run, group, left, rays.origin[lead], rays.direction[lead])
+                left = left & ~(wp.uint32(1) << wp.uint32(entry - group))
+                k = object_listed(sets, run, entry)
 
                 # Search for the rays that may meet it.
                 count = int(0)
                 for i in range(begin, end):
-                    if has_bit(to_meet[i - begin], k):
+                    if can_meet(sets, rays, run, entry, k, i):
                         if to_infinity or may_meet(objects[k], rays.origin[i], rays.direction[i], hits.t[i]):
                             t_max = wp.where(to_infinity, wp.inf, BEYOND * hits.t[i])
                             searched[count] = searched_ray(views, objects, k, rays, i, t_max)

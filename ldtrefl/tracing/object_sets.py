@@ -1,19 +1,16 @@
-"""Which objects each ray can meet, as a row of bits: one row for a *run* of rays, or for each ray its own.
+"""Which objects each ray can meet, as a list for each *run* of rays.
 
-Rays come in runs that stand together on the screen: the rays of the first bounce stand in blocks of 8 x 8 pixels.
+Rays come in runs that stand together on the screen: the rays of the first bounce stand in blocks of 8 x 8 pixels. The
+list of a run names the objects that any of its rays can meet, each with a bit for every ray that can.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import numpy as np
 import warp as wp
 
-from ldtrefl.world.records import ObjectRecord
-
 RUN = wp.constant(64)
-"""Rays in a row that share a row of bits."""
+"""Rays in a row that share a list: as many as an integer has bits."""
 
 LOWEST_BIT = """
 #if defined(__CUDA_ARCH__)
@@ -30,64 +27,80 @@ def lowest_bit(word: wp.uint32) -> wp.int32:
     ...
 
 
+LOWEST_BIT_OF_64 = """
+#if defined(__CUDA_ARCH__)
+    return __ffsll((long long)word) - 1;
+#else
+    return __builtin_ctzll(word);
+#endif
+"""
+
+
+@wp.func_native(LOWEST_BIT_OF_64)
+def lowest_bit_of_64(word: wp.uint64) -> wp.int32:
+    """The number of the lowest bit that is set; undefined if none is."""
+    ...
+
+
 @wp.struct
 class ObjectSets:
-    """The objects that each ray can meet, a bit an object."""
+    """The objects that rays can meet, run by run."""
 
-    bits: wp.array2d(dtype=wp.uint32)  # empty: every ray can meet all objects
-    rows: wp.array(dtype=wp.int32)  # the row of each ray; empty: its run's
-
-
-@wp.func
-def object_bits(sets: ObjectSets, objects: wp.array(dtype=ObjectRecord), i: int, word: int) -> wp.uint32:
-    """The objects ``32 * word`` to ``32 * word + 31`` that ray ``i`` can meet, a bit each."""
-    if sets.bits.shape[0] > 0:
-        if sets.rows.shape[0] > 0:
-            return sets.bits[sets.rows[i], word]
-        return sets.bits[i / RUN, word]
-    rest = objects.shape[0] - 32 * word
-    if rest >= 32:
-        return ~wp.uint32(0)
-    return (wp.uint32(1) << wp.uint32(rest)) - wp.uint32(1)
+    start: wp.array(dtype=wp.int32)  # of each run, its first entry; empty: every ray can meet all objects
+    count: wp.array(dtype=wp.int32)  # of each run's entries
+    object: wp.array(dtype=wp.int32)  # of each entry
+    rays: wp.array(dtype=wp.uint64)  # of each entry, the rays of the run that can meet it, a bit each
 
 
 @wp.func
-def without(bits: wp.uint32, k: int) -> wp.uint32:
-    """The bits without that of object ``k``."""
-    return bits & ~(wp.uint32(1) << wp.uint32(k % 32))
+def objects_listed(sets: ObjectSets, objects: int, run: int) -> int:
+    """How many objects the rays of a run may meet, of so many in all."""
+    if sets.start.shape[0] == 0:
+        return objects
+    return sets.count[run]
 
 
 @wp.func
-def has_bit(bits: wp.uint32, k: int) -> bool:
-    """Whether the bit of object ``k`` is set in its word."""
-    return (bits & (wp.uint32(1) << wp.uint32(k % 32))) != wp.uint32(0)
+def object_listed(sets: ObjectSets, run: int, entry: int) -> int:
+    """The number of an object that the rays of a run may meet."""
+    if sets.start.shape[0] == 0:
+        return entry
+    return sets.object[sets.start[run] + entry]
 
 
-def word_count(objects: int) -> int:
-    """32-bit words in a row of bits for so many objects."""
-    return -(-objects // 32)
+@wp.func
+def is_listed(sets: ObjectSets, run: int, entry: int, i: int) -> bool:
+    """Whether ray ``i``, of this run, can meet that object."""
+    if sets.start.shape[0] == 0:
+        return True
+    return (sets.rays[sets.start[run] + entry] >> wp.uint64(i - RUN * run)) & wp.uint64(1) != wp.uint64(0)
 
 
-def bits_of(numbers: Iterable[int], objects: int) -> np.ndarray:
-    """(words,) uint32: a row in which the bits of these objects are set."""
-    row = np.zeros(word_count(objects), np.uint32)
-    for k in numbers:
-        row[k // 32] |= np.uint32(1 << k % 32)
-    return row
-
-
-def objects_in(table: np.ndarray, objects: int) -> set[int]:
-    """Objects whose bit is set in any row of an (n, words) uint32 table."""
-    union = np.bitwise_or.reduce(table, axis=0)
-    return {k for k in range(objects) if union[k // 32] >> np.uint32(k % 32) & np.uint32(1)}
-
-
-def sets_of_runs(bits: wp.array) -> ObjectSets:
-    """Sets that have a row of bits for each run. Without any rows every ray can meet all objects."""
+def all_sets(device: wp.Device) -> ObjectSets:
+    """Every ray can meet all objects."""
     sets = ObjectSets()
-    sets.bits = bits
-    sets.rows = wp.empty(0, dtype=wp.int32, device=bits.device)
+    sets.start, sets.count, sets.object = (wp.empty(0, dtype=wp.int32, device=device) for _ in range(3))
+    sets.rays = wp.empty(0, dtype=wp.uint64, device=device)
     return sets
+
+
+def sets_for_runs(sets: ObjectSets, runs: np.ndarray) -> ObjectSets:
+    """The lists of these runs alone, (m,) by number."""
+    chosen = ObjectSets()
+    device = sets.start.device
+    chosen.start, chosen.count = (
+        wp.array(array.numpy()[runs], dtype=wp.int32, device=device) for array in (sets.start, sets.count)
+    )
+    chosen.object, chosen.rays = sets.object, sets.rays
+    return chosen
+
+
+def entries(sets: ObjectSets) -> tuple[np.ndarray, np.ndarray]:
+    """(k,) the run and (k,) the object of every entry of the lists, run by run."""
+    start, count = sets.start.numpy(), sets.count.numpy()
+    runs = np.repeat(np.arange(len(count)), count)
+    within = np.arange(len(runs)) - np.repeat(np.cumsum(count) - count, count)
+    return runs, sets.object.numpy()[start[runs] + within]
 
 
 def run_count(rays: int) -> int:

@@ -21,6 +21,7 @@ from ldtrefl.world.device_object import DeviceObject, set_geometry, set_material
 from ldtrefl.world.device_space import device_space
 from ldtrefl.world.lighting import lighting_of
 from ldtrefl.world.records import LightingRecord, ObjectRecord
+from ldtrefl.world.top_level import TopLevel, order_of, top_level
 
 MOST_NUMBERS = (1 << 31) - 1
 """The most triangles, and vertices, that all objects may have together: they are numbered by int32."""
@@ -47,6 +48,7 @@ class DeviceScene:
         self.scene = scene
         self.device = device
         self._skip_attributes = skip_attributes
+        self._top_order: np.ndarray | None = None if before is None else before._top_order
         self._decoded = wp.array(linear_of_bytes(), dtype=float, device=device, copy=False)
         self.device_from_world = device_space(scene.layout_box)
         meshes = self._device_meshes(before)
@@ -107,6 +109,15 @@ class DeviceScene:
         counts = [len(entry.geometry.faces) if entry.source.is_reflector else 0 for entry in self.objects]
         firsts = np.cumsum([0, *counts])
         return wp.array(firsts[:-1].astype(np.int32), dtype=wp.int32, device=self.device), int(firsts[-1])
+
+    @functools.cached_property
+    def top_level(self) -> TopLevel:
+        """The tree over all objects, in the order in which they stood when the scene was laid out."""
+        centres = np.array([entry.record.centre for entry in self.objects], np.float64).reshape(-1, 3)
+        radii = np.array([entry.record.radius for entry in self.objects], np.float32)
+        if self._top_order is None:
+            self._top_order = order_of(centres)
+        return top_level(centres, radii, self._top_order, self.device)
 
     def moved_since(self, before: DeviceScene) -> frozenset[int]:
         """Numbers of the objects that have moved since a scene that this one comes from."""

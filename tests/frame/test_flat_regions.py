@@ -8,6 +8,7 @@ from ldtrefl.device import launch
 from ldtrefl.device.stats import Stats
 from ldtrefl.frame.flat_regions import flat_regions, shows_flat
 from ldtrefl.scene.description import Object
+from ldtrefl.tracing.object_sets import RUN, ObjectSets, entries
 from tests.conftest import SCENES
 from tests.frame import flat_mirror
 from tests.frame.random_mirrors import meet, on_device, random_mirrors, reflected
@@ -69,11 +70,21 @@ def test_a_flat_mirror_shows_what_stands_before_it_alone() -> None:
     regions = flat_regions(gbuffer, shaded.rays, stats)
     assert regions.shown == {flat_mirror.BOX}
     assert stats.counters["triangles_tested"] == 2
-    rows = regions.sets.rows.numpy()
-    np.testing.assert_array_equal(rows, gbuffer.triangles.ravel()[shaded.rays.pixel.numpy()])
-    bits = regions.sets.bits.numpy()[rows, 0]
     reflects = np.isin(shaded.rays.pixel.numpy(), _pixels_that_show_the_box(given))
-    assert reflects.sum() > 100 and (bits[reflects] == 1 << flat_mirror.BOX).all()
+    assert reflects.sum() > 100 and can_meet(regions.sets, flat_mirror.BOX, len(reflects))[reflects].all()
+    runs, objects = entries(regions.sets)
+    assert set(objects.tolist()) == {flat_mirror.BOX} and len(np.unique(runs)) == len(runs)
+
+
+def can_meet(sets: ObjectSets, k: int, rays: int) -> np.ndarray:
+    """(rays,) whether each can meet object ``k``, by the lists of their runs."""
+    start, count = sets.start.numpy(), sets.count.numpy()
+    met = np.zeros((len(start), int(RUN)), bool)
+    for run, (begin, listed) in enumerate(zip(start, count, strict=True)):
+        for entry in range(begin, begin + listed):
+            if sets.object.numpy()[entry] == k:
+                met[run] |= sets.rays.numpy()[entry] >> np.arange(int(RUN), dtype=np.uint64) & np.uint64(1) != 0
+    return met.ravel()[:rays]
 
 
 def _pixels_that_show_the_box(given: ldtrefl.Scene) -> np.ndarray:

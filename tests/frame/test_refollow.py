@@ -51,7 +51,7 @@ def test_only_runs_that_can_meet_what_moved_are_followed_again() -> None:
     gbuffer, shaded = flat_mirror.seen_and_shaded(moved_scene)
     follower = flat_mirror.follower(gbuffer, culls=True)
     regions = follower.first_regions(shaded.rays)
-    runs = changed_runs(before, shaded.rays, regions, {flat_mirror.BOX})
+    runs = changed_runs(before, shaded.rays, regions, {flat_mirror.BOX}, 3)
     assert runs is not None
     count = shaded.rays.pixel.shape[0]
     meets = meets_box(before, scene) | meets_box(truth, moved_scene)
@@ -82,7 +82,7 @@ def test_rays_that_were_mirrored_again_are_followed_again() -> None:
     gbuffer, shaded = flat_mirror.seen_and_shaded(moved_scene)
     follower = flat_mirror.follower(gbuffer, 3, culls=True)
     regions = follower.first_regions(shaded.rays)
-    runs = changed_runs(before, shaded.rays, regions, {2})
+    runs = changed_runs(before, shaded.rays, regions, {2}, 3)
     assert runs is not None
     found = follow_changed(follower, before, shaded.rays, regions, runs)
     assert (values(truth)["radiance"] != values(before)["radiance"]).any(axis=1).sum() > 30
@@ -103,14 +103,14 @@ def test_nothing_that_moved_is_met_or_nothing_is_known() -> None:
     gbuffer, shaded = flat_mirror.seen_and_shaded(scene)
     follower = flat_mirror.follower(gbuffer, culls=True)
     regions = follower.first_regions(shaded.rays)
-    none = changed_runs(before, shaded.rays, regions, set())
+    none = changed_runs(before, shaded.rays, regions, set(), 3)
     assert none is not None and len(none) == 0
     found = follow_changed(follower, before, shaded.rays, regions, none)
     for name, expected in values(before).items():
         np.testing.assert_array_equal(values(found)[name], expected, err_msg=name)
     # Without culling no run tells what it can meet.
     everything = flat_mirror.follower(gbuffer).first_regions(shaded.rays)
-    assert changed_runs(before, shaded.rays, everything, set()) is None
+    assert changed_runs(before, shaded.rays, everything, set(), 3) is None
 
 
 @pytest.mark.parametrize("field", ["origin", "direction", "source"])
@@ -121,7 +121,7 @@ def test_a_ray_that_is_another_has_its_run_followed_again(field: str) -> None:
     regions = flat_mirror.follower(gbuffer, culls=True).first_regions(shaded.rays)
     values = getattr(shaded.rays, field).numpy()
     values[200] = values[200] + 1
-    runs = changed_runs(before, shaded.rays, regions, set())
+    runs = changed_runs(before, shaded.rays, regions, set(), 3)
     assert runs is not None and runs.tolist() == [200 // 64]
 
 
@@ -131,4 +131,4 @@ def test_other_pixels_that_see_the_mirror_are_not_compared() -> None:
     gbuffer, shaded = flat_mirror.seen_and_shaded(scene)
     regions = flat_mirror.follower(gbuffer, culls=True).first_regions(shaded.rays)
     shaded.rays.pixel.numpy()[0] += 1
-    assert changed_runs(before, shaded.rays, regions, set()) is None
+    assert changed_runs(before, shaded.rays, regions, set(), 3) is None

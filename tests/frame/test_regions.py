@@ -7,10 +7,11 @@ import warp as wp
 import ldtrefl
 from ldtrefl.device import launch
 from ldtrefl.frame.regions import cull_runs
+from ldtrefl.frame.run_lists import RunLists, listed
 from ldtrefl.scene.description import Camera, Material, Object, Scene
-from ldtrefl.tracing.object_sets import RUN
+from ldtrefl.tracing.object_sets import RUN, entries
 from ldtrefl.tracing.ray_buffers import RayBuffer
-from ldtrefl.world.records import ObjectRecord
+from ldtrefl.world.top_level import order_of, top_level
 from tests.frame.random_mirrors import meet, on_device, random_mirrors, reflected
 
 SPHERES = 50
@@ -30,16 +31,18 @@ def test_no_ray_is_lost(bend: float) -> None:
     device, n = rays.origin.device, rays.origin.shape[0]
     rays.source = wp.full(n, SPHERES, dtype=wp.int32, device=device)
     rays.may_return = wp.zeros(n, dtype=wp.uint8, device=device)
-    objects = []
-    for c, r in zip(centre, radius, strict=True):
-        record = ObjectRecord()
-        record.centre, record.radius = wp.vec3d(*c), float(r) * (1 + 1e-5)  # as in a scene
-        objects.append(record)
-    records = wp.array(objects, dtype=ObjectRecord, device=device)
-    bits = wp.empty((len(origins), (SPHERES + 31) // 32), dtype=wp.uint32, device=device)
-    nothing, none_kept = wp.empty(0, dtype=wp.int32, device=device), wp.empty(0, dtype=wp.uint8, device=device)
-    launch.launch(cull_runs, len(origins), [rays, records, nothing, nothing, bits, none_kept], device)
-    kept = np.unpackbits(bits.numpy().view(np.uint8), axis=1, bitorder="little")[:, :SPHERES] != 0
+    shown, none_shows = wp.zeros(SPHERES, dtype=wp.uint8, device=device), wp.empty(0, dtype=wp.uint8, device=device)
+    padded = (radius * (1 + 1e-5)).astype(np.float32)  # as in a scene
+    top, nothing = top_level(centre, padded, order_of(centre), device), wp.empty(0, dtype=int, device=device)
+
+    def fill(lists: RunLists, room: int) -> None:
+        launch.launch(cull_runs, len(origins), [rays, top, nothing, nothing, room, lists, shown, none_shows], device)
+
+    runs, objects = entries(listed(len(origins), SPHERES, device, fill))
+    kept = np.zeros((len(origins), SPHERES), bool)
+    kept[runs, objects] = True
+    assert len(runs) == kept.sum(), "an object is listed twice"
+    np.testing.assert_array_equal(shown.numpy() != 0, kept.any(axis=0))
     truth = np.stack([meet(origins, directions, c, r).any(axis=1) for c, r in zip(centre, radius, strict=True)], 1)
     assert 0.02 < truth.mean() < 0.98
     assert not (truth & ~kept).any(), f"{(truth & ~kept).sum()} of {truth.sum()} lost"

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Sequence
+
 import numpy as np
 import warp as wp
 
 from ldtrefl.device import launch
 from ldtrefl.scene.description import Camera, Object, Scene
+from ldtrefl.tracing.object_sets import RUN, ObjectSets, run_count
 from ldtrefl.tracing.ray_buffers import RayBuffer, empty_rays
 from ldtrefl.world.device_scene import DeviceScene
 
@@ -37,3 +40,19 @@ def distances(origins: np.ndarray, directions: np.ndarray, places: np.ndarray) -
     sides = (places + np.array([-HALF, HALF])[:, None, None, None] - origins[:, None]) / directions[:, None]
     enter, leave = sides.min(axis=0).max(axis=-1), sides.max(axis=0).min(axis=-1)
     return np.where((enter > 0) & (enter < leave), enter, np.inf)
+
+
+def sets_of_rays(objects: Sequence[Collection[int]], device: wp.Device) -> ObjectSets:
+    """Lists in which each ray can meet these objects."""
+    lists: list[dict[int, int]] = [{} for _ in range(run_count(len(objects)))]
+    for i, mine in enumerate(objects):
+        for k in mine:
+            lists[i // int(RUN)][k] = lists[i // int(RUN)].get(k, 0) | 1 << i % int(RUN)
+    counts = np.array([len(one) for one in lists])
+    sets = ObjectSets()
+    for name, values in (("start", np.cumsum(counts) - counts), ("count", counts)):
+        setattr(sets, name, wp.array(values, dtype=wp.int32, device=device))
+    numbers, bits = [k for one in lists for k in one], [bits for one in lists for bits in one.values()]
+    sets.object = wp.array(np.array(numbers, np.int32), dtype=wp.int32, device=device)
+    sets.rays = wp.array(np.array(bits, np.uint64), dtype=wp.uint64, device=device)
+    return sets

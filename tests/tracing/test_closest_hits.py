@@ -13,15 +13,15 @@ from ldtrefl.ldt.scene_maps import MapOptions, SceneMaps
 from ldtrefl.scene import shapes
 from ldtrefl.scene.description import Camera, Material, Object, Scene
 from ldtrefl.tracing.closest_hits import closest_hits_kernel
-from ldtrefl.tracing.object_sets import ObjectSets, bits_of, sets_of_runs
+from ldtrefl.tracing.object_sets import ObjectSets, all_sets
 from ldtrefl.tracing.ray_buffers import HitBuffer, RayBuffer, empty_hits
 from ldtrefl.tracing.scene_bvh import SceneBvh
 from ldtrefl.tracing.tracer import SceneTracer, block_of
 from ldtrefl.world.device_scene import DeviceScene
-from tests.tracing.boxes import HALF, distances, rays_of, scene_of
+from tests.tracing.boxes import HALF, distances, rays_of, scene_of, sets_of_rays
 
 BOXES = 70
-"""Three words of bits, the last one short."""
+"""Three groups, the last one short."""
 
 
 def found(
@@ -36,7 +36,7 @@ def found(
     count = rays.source.shape[0]
     hits, block = empty_hits(count, scene.device), block_of(scene.device)
     bound = (tracer or SceneBvh()).bound(scene, set(range(len(scene.objects))), Stats())
-    sets = sets or sets_of_runs(wp.empty((0, 0), dtype=wp.uint32, device=scene.device))
+    sets = sets or all_sets(scene.device)
     kernel = closest_hits_kernel(bound.tracer, block, bounds)
     launch.launch(kernel, -(-count // block), [rays, scene.records, bound.views, sets, hits], scene.device)
     return hits
@@ -84,9 +84,7 @@ def test_only_objects_of_a_rays_set_are_met() -> None:
     scene = scene_of(places)
     allowed = [{0, 1, 2, 3}, {1, 3}, {3}, set()]
     origins, directions = np.tile([-1.0, 0.01, 0.02], (4, 1)), np.tile([1.0, 0.0, 0.0], (4, 1))
-    sets = ObjectSets()
-    sets.bits = wp.array(np.stack([bits_of(s, 4) for s in allowed]), dtype=wp.uint32, device=scene.device)
-    sets.rows = wp.array([0, 1, 2, 3], dtype=wp.int32, device=scene.device)
+    sets = sets_of_rays(allowed, scene.device)
     # A ray leaves an object that is not there to be met: the last one, which stands behind all that are met.
     hits = found(scene, rays_of(scene, origins, directions, np.array([3, 0, 0, 0])), sets)
     assert hits.object.numpy().tolist() == [0, 1, 3, -1]
@@ -162,7 +160,7 @@ def test_rays_meet_the_object_that_they_leave_where_brute_force_says(tracer: str
 @pytest.mark.parametrize("objects", [10, 40])
 @pytest.mark.parametrize("skip", ["all", "none"])
 def test_rays_of_a_frame_end_where_each_objects_own_caster_says(objects: int, skip: str) -> None:
-    """Objects in more than one word of bits, with and without what culls them; none is moved or scaled."""
+    """Objects in more than one group, with and without what culls them; none is moved or scaled."""
     rng = np.random.default_rng(0)
     ball = Object(shape="sphere", params={"segments": [24, 12]}, material=Material(mirror=1.0))
     things = []

@@ -1,4 +1,4 @@
-"""Rows of bits: which objects a ray can meet, against Python's sets."""
+"""Lists of the objects that rays can meet, against Python's sets."""
 
 import numpy as np
 import pytest
@@ -8,18 +8,18 @@ from ldtrefl.device import launch
 from ldtrefl.tracing.object_sets import (
     RUN,
     ObjectSets,
-    bits_of,
-    has_bit,
+    all_sets,
+    entries,
+    is_listed,
     lowest_bit,
-    object_bits,
-    objects_in,
+    lowest_bit_of_64,
+    object_listed,
+    objects_listed,
     rays_of,
     run_count,
-    sets_of_runs,
-    without,
-    word_count,
+    sets_for_runs,
 )
-from ldtrefl.world.records import ObjectRecord
+from tests.tracing.boxes import sets_of_rays
 
 
 @launch.kernel
@@ -27,52 +27,72 @@ def list_objects(
     first: int,
     # In:
     sets: ObjectSets,
-    objects: wp.array(dtype=ObjectRecord),
+    objects: int,
     # Out:
     met_out: wp.array2d(dtype=wp.uint8),
 ):
-    """Mark the objects that one ray can meet, word after word, and check each bit by itself."""
+    """Count, for one ray, how often each object stands in its list."""
     i = first + wp.tid()
-    for word in range((objects.shape[0] + 31) / 32):
-        bits = object_bits(sets, objects, i, word)
-        while bits != wp.uint32(0):
-            k = lowest_bit(bits)
-            if has_bit(bits, k):
-                met_out[i, 32 * word + k] = met_out[i, 32 * word + k] + wp.uint8(1)
-            bits = without(bits, k)
+    run = i / RUN
+    for entry in range(objects_listed(sets, objects, run)):
+        k = object_listed(sets, run, entry)
+        if is_listed(sets, run, entry, i):
+            met_out[i, k] = met_out[i, k] + wp.uint8(1)
 
 
 def objects_met(sets: ObjectSets, rays: int, objects: int) -> list[set[int]]:
-    """By ray, the objects that a kernel finds in its row; each must be found once."""
+    """By ray, the objects that a kernel finds in its list; each must be found once."""
     device = launch.resolve_device(None)
     met = wp.zeros((rays, objects), dtype=wp.uint8, device=device)
-    launch.launch(list_objects, rays, [sets, wp.empty(objects, dtype=ObjectRecord, device=device), met], device)
+    launch.launch(list_objects, rays, [sets, objects, met], device)
     assert met.numpy().max() <= 1
     return [set(np.flatnonzero(row).tolist()) for row in met.numpy()]
 
 
 @pytest.mark.parametrize("objects", [1, 31, 32, 33, 70])
-def test_without_rows_every_ray_can_meet_all(objects: int) -> None:
-    device = launch.resolve_device(None)
-    none = sets_of_runs(wp.empty((0, 0), dtype=wp.uint32, device=device))
-    assert objects_met(none, 3, objects) == [set(range(objects))] * 3
+def test_without_lists_every_ray_can_meet_all(objects: int) -> None:
+    assert objects_met(all_sets(launch.resolve_device(None)), 3, objects) == [set(range(objects))] * 3
 
 
-def test_rows_belong_to_runs_or_to_rays() -> None:
-    device, run = launch.resolve_device(None), int(RUN)
-    rows = [{0, 5, 31}, {32, 69}, set()]
-    table = np.stack([bits_of(row, 70) for row in rows])
-    bits = wp.array(table, dtype=wp.uint32, device=device)
-    met = objects_met(sets_of_runs(bits), 2 * run + 1, 70)
-    assert met == [rows[0]] * run + [rows[1]] * run + [rows[2]]
-    own = sets_of_runs(bits)
-    own.rows = wp.array([2, 0, 1], dtype=wp.int32, device=device)
-    assert objects_met(own, 3, 70) == [rows[2], rows[0], rows[1]]
-    assert objects_in(table, 70) == {0, 5, 31, 32, 69}
+def test_lists_tell_runs_and_rays_apart() -> None:
+    rng = np.random.default_rng(0)
+    rays = 2 * int(RUN) + 5
+    expected = [set(rng.choice(70, rng.integers(0, 9), replace=False).tolist()) for _ in range(rays)]
+    sets = sets_of_rays(expected, launch.resolve_device(None))
+    assert objects_met(sets, rays, 70) == expected
+    ends = sets_for_runs(sets, np.array([0, 2]))
+    assert objects_met(ends, int(RUN) + 5, 70) == expected[: int(RUN)] + expected[2 * int(RUN) :]
+    runs, objects = entries(sets)
+    by_run = [set().union(*expected[begin : begin + int(RUN)]) for begin in range(0, rays, int(RUN))]
+    assert [set(objects[runs == run].tolist()) for run in range(3)] == by_run
+    runs, objects = entries(ends)
+    assert [set(objects[runs == run].tolist()) for run in range(2)] == [by_run[0], by_run[2]]
 
 
-def test_words_and_runs_are_counted_up() -> None:
-    assert [word_count(n) for n in (0, 1, 32, 33)] == [0, 1, 1, 2]
+@launch.kernel
+def find_lowest_bits(
+    first: int,
+    # In:
+    words: wp.array(dtype=wp.uint64),
+    # Out:
+    lowest_out: wp.array2d(dtype=wp.int32),
+):
+    """Find the lowest bit of one word, and of its lower half."""
+    i = first + wp.tid()
+    lowest_out[i, 0] = lowest_bit_of_64(words[i])
+    lowest_out[i, 1] = lowest_bit(wp.uint32(words[i] & wp.uint64(0xFFFFFFFF)))
+
+
+def test_the_lowest_bit_of_a_word() -> None:
+    device, bits = launch.resolve_device(None), np.arange(64)
+    words = (np.uint64(1) << bits.astype(np.uint64)) | (np.uint64(1) << np.uint64(63))
+    found = wp.empty((64, 2), dtype=wp.int32, device=device)
+    launch.launch(find_lowest_bits, 64, [wp.array(words, dtype=wp.uint64, device=device), found], device)
+    np.testing.assert_array_equal(found.numpy()[:, 0], bits)
+    np.testing.assert_array_equal(found.numpy()[:32, 1], bits[:32])
+
+
+def test_runs_are_counted_up() -> None:
     run = int(RUN)
     assert [run_count(n) for n in (0, 1, run, run + 1)] == [0, 1, 1, 2]
     assert rays_of(np.array([0, 2]), 2 * run + 3).tolist() == [*range(run), *range(2 * run, 2 * run + 3)]
