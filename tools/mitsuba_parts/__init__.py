@@ -1,0 +1,1 @@
+"""What ``mitsuba_comparison.py`` is made of."""
