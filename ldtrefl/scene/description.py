@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import logging
+import operator
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
@@ -160,11 +161,9 @@ class Material:
     fresnel: Flag = False
     """Schlick's approximation, with ``mirror`` as the reflectance at normal incidence."""
 
-    @model_validator(mode="after")
-    def _albedo_if_not_given(self) -> Material:
+    def __post_init__(self) -> None:
         if isinstance(self.albedo, _NotGiven):
             object.__setattr__(self, "albedo", _NotGiven((0.0 if any(self.mirror) else 0.8,) * 3))
-        return self
 
     @functools.cached_property
     def picture(self) -> StoredPicture | None:
@@ -174,9 +173,10 @@ class Material:
     @property
     def excess(self) -> tuple[float, str] | None:
         """The largest sum of albedo and mirror in a channel, and the channel, where it is above 1; else None."""
-        channels = zip(self.albedo, self.mirror, ("red", "green", "blue"), strict=True)
-        largest = max((albedo + mirror, name) for albedo, mirror, name in channels)
-        return largest if largest[0] > 1.0 + ROUNDING else None
+        sums = tuple(map(operator.add, self.albedo, self.mirror))
+        if max(sums) <= 1.0 + ROUNDING:
+            return None
+        return max(zip(sums, ("red", "green", "blue"), strict=True))
 
 
 @refusing_in_one_line
@@ -199,26 +199,21 @@ class Object:
     """Shading normals: interpolated, or the facet's."""
     material: Material = Field(default_factory=Material)
 
-    @model_validator(mode="after")
-    def _one_geometry(self) -> Object:
+    def __post_init__(self) -> None:
+        # No validators of the class: they would be asked again when a scene takes the object.
         if (self.mesh is None) == (self.shape is None):
             raise ValueError("needs either 'mesh' or 'shape', and not both")
         if self.params and self.shape is None:
             raise ValueError("'params' goes with 'shape'")
         if max(map(abs, self.rotate[:3])) < SMALLEST:
             raise ValueError(f"rotate: the axis must not be the zero vector, nor shorter than {SMALLEST:g}")
-        return self
-
-    @model_validator(mode="after")
-    def _warns_if_it_adds_light(self) -> Object:
-        if self.material.excess is not None:
-            total, channel = self.material.excess
+        if (excess := self.material.excess) is not None:
+            total, channel = excess
             called = self.name or self.shape or (self.mesh if isinstance(self.mesh, str) else "without a name")
             _warn_once(
                 f"object '{printable(called)}': material.albedo and material.mirror add up to {total:.3g} in "
                 f"{channel}: above 1 it gives back more light than falls on it"
             )
-        return self
 
     @functools.cached_property
     def geometry(self) -> Mesh:

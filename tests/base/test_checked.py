@@ -32,6 +32,7 @@ WRONG: list[tuple[Callable[[], object], str]] = [
     (lambda: Material(mirror=1.5), "Material: mirror: should be less than or equal to 1, got 1.5"),
     (lambda: Material(mirror=(0.5, 2, 0)), r"Material: mirror\[1\]: "),
     (lambda: Material(albedo=True), "Material: albedo: "),
+    (lambda: Object(shape="box", translate=(0, True, 0)), r"Object: translate\[1\]: should be a valid number"),
     (lambda: Material(albedo=float("nan")), "Material: albedo: should be a finite number"),
     (lambda: Object(shape="box", scale=-1.0), "Object: scale: should be from 1e-15 to 1e.15, got -1$"),
     (lambda: Object(shape="box", scale=(1, 1, 1e-300)), r"Object: scale\[2\]: should be from 1e-15"),
@@ -79,6 +80,8 @@ def test_numpy_values_are_taken() -> None:
     assert camera == CAMERA
     assert Object(shape="box", scale=np.float32(2.0), smooth=np.bool_(False)).scale == 2.0
     assert Material(mirror=np.full(3, 0.5)).mirror == (0.5, 0.5, 0.5)
+    single = Camera(eye=(np.int64(0), np.float32(-5), np.float64(1)), look_at=[0, 0, 0], width=8, height=6)
+    assert single == CAMERA and {type(number) for number in single.eye} == {float}
 
 
 def test_albedo_that_nobody_stated() -> None:

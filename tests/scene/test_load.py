@@ -19,7 +19,7 @@ WRONG = [
     ("[0.0, -5.0, 1.0]", "[0.0, inf, 1.0]", r"camera\.eye\[1\]: .*got inf"),
     ("[0.0, -5.0, 1.0]", "[0.0, 1.0]", r"camera\.eye\[2\]: Field required"),
     ("[0.0, -5.0, 1.0]", '"far"', r"camera\.eye: should be a list, got 'far'"),
-    ("[0.0, -5.0, 1.0]", "[true, 0, 1]", r"camera\.eye\[0\]: should be a number"),
+    ("[0.0, -5.0, 1.0]", "[true, 0, 1]", r"camera\.eye\[0\]: should be a valid number, got True"),
     ("[0.0, -5.0, 1.0]", "[0.0, 0.0, 0.0]", r"camera: eye and look_at are the same point"),
     ("[0.0, -5.0, 1.0]", "[0.0, 0.0, 3.0]", r"camera: up is parallel"),
     ("width = 24", "width = 0", r"camera\.width: .*greater than or equal to 1, got 0"),
