@@ -39,12 +39,15 @@ from ldtrefl.base.errors import InputError, printable, unknown_name
 from ldtrefl.files.picture_reading import stored_picture
 from ldtrefl.files.stored_picture import StoredPicture
 from ldtrefl.scene import shapes
+from ldtrefl.scene.layout import Layout
 from ldtrefl.scene.mesh import Mesh
 from ldtrefl.scene.placement import placement
 from ldtrefl.scene.readers.mesh_files import load_mesh
 
 MAX_SIDE = 16384
-"""The most pixels along a side of an image, and the most objects in a scene."""
+"""The most pixels along a side of an image."""
+MAX_OBJECTS = 1 << 20
+"""The most objects in a scene."""
 MAX_LIGHTS = 64
 """The most lights in a scene."""
 PARALLEL = 1e-9
@@ -53,9 +56,6 @@ NARROWEST = 1e-6
 """The smallest field of view in degrees: at 16,384 pixels a pixel's share is still far above float64's rounding."""
 ROUNDING = 1e-6
 """How far above 1 albedo and mirror may add up without a warning: decimals such as 0.9 and 0.1 are rounded."""
-
-CORNERS = np.array(np.meshgrid([0, 1], [0, 1], [0, 1])).reshape(3, -1).T
-"""(8, 3): of a box's corners, along each axis 0 for its low and 1 for its high side."""
 
 _log = logging.getLogger("ldtrefl")
 
@@ -245,15 +245,25 @@ class Object:
         """
         return self._world_from_object.copy()
 
-    def world_corners(self) -> np.ndarray:
-        """(8, 3) float64: the corners of the mesh's bounding box, placed in the world."""
-        low, high = self.geometry.bounds
-        corners = np.where(CORNERS == 0, low, high)
-        return (np.hstack([corners, np.ones((8, 1))]) @ self._world_from_object.T)[:, :3]
-
     @functools.cached_property
     def _world_from_object(self) -> np.ndarray:
         return placement(self.geometry.bounds, self.fit, self.scale, self.rotate, self.translate)
+
+
+PLACED_BY = ("geometry", "fit", "scale", "rotate", "translate")
+"""The fields of an object that say where it stands."""
+
+
+def _share_geometries(objects: tuple[Object, ...]) -> None:
+    """Give the objects that have no mesh yet theirs, one for all that name the same file, or shape and parameters."""
+    made: dict[tuple[str | None, str | Mesh | None, str], Mesh] = {}
+    for entry in objects:
+        if "geometry" not in vars(entry):
+            source = entry.shape, entry.mesh, repr(entry.params)
+            if source in made:
+                entry.share_geometry(made[source])
+            else:
+                made[source] = entry.geometry
 
 
 @functools.lru_cache(maxsize=1024)
@@ -290,28 +300,50 @@ class Scene:
     environment: Environment = Field(default_factory=Environment)
     lighting: Lighting = Field(default_factory=Lighting)
     lights: Annotated[tuple[Light, ...], Field(alias="light", max_length=MAX_LIGHTS)] = ()
-    objects: Annotated[tuple[Object, ...], Field(alias="object", max_length=MAX_SIDE)] = ()
+    objects: Annotated[tuple[Object, ...], Field(alias="object", max_length=MAX_OBJECTS)] = ()
     reflection: Reflection = Field(default_factory=Reflection)
     expect: dict[str, Expectation] = Field(default_factory=dict)
+
+    @functools.cached_property
+    def layout(self) -> Layout:
+        """Where the objects stand, and their meshes.
+
+        Raises:
+            InputError: a mesh cannot be had, or an object's size is not allowed.
+        """
+        _share_geometries(self.objects)
+        fields = [[getattr(entry, name) for entry in self.objects] for name in PLACED_BY]
+        layout = Layout.of(*fields)
+        for number in layout.wrong:
+            try:
+                self.objects[number].world_from_object()
+            except InputError as error:
+                raise error.within(f"object[{number}]") from None
+        return layout
 
     @functools.cached_property
     def layout_box(self) -> np.ndarray:
         """(2, 3) float64: the lowest and highest corner of the box about all objects in the world, as the scene was
         laid out. Scenes that :meth:`with_camera` and :meth:`with_object` make of it keep that box, wherever objects
         move."""
-        if not self.objects:
-            return np.array([[-1.0] * 3, [1.0] * 3])
-        corners = np.concatenate([entry.world_corners() for entry in self.objects])
-        return np.stack([corners.min(axis=0), corners.max(axis=0)])
+        return self.layout.box
 
-    def _laid_out_alike(self, other: Scene) -> Scene:
-        """A scene that comes from this one, with its ``layout_box``."""
-        object.__setattr__(other, "layout_box", self.layout_box)
+    def _laid_out_alike(self, other: Scene, layout: Layout) -> Scene:
+        """A scene that comes from this one, with its ``layout_box`` and its objects' names."""
+        vars(other).update(layout_box=self.layout_box, layout=layout, _numbers=self._numbers)
         return other
 
     def with_camera(self, camera: Camera) -> Scene:
         """The same scene seen by another camera."""
-        return self._laid_out_alike(dataclasses.replace(self, camera=camera))
+        return self._laid_out_alike(dataclasses.replace(self, camera=camera), self.layout)
+
+    @functools.cached_property
+    def _numbers(self) -> dict[str, int]:
+        """The number of each name, of the first object that has it."""
+        numbers: dict[str, int] = {}
+        for number, entry in enumerate(self.objects):
+            numbers.setdefault(entry.name, number)
+        return numbers
 
     def number_of(self, name: str) -> int:
         """The number of the object called ``name``, the first of several.
@@ -319,10 +351,9 @@ class Scene:
         Raises:
             InputError: there is none.
         """
-        names = [entry.name for entry in self.objects]
-        if name not in names:
-            raise unknown_name("object", name, names)
-        return names.index(name)
+        if name not in self._numbers:
+            raise unknown_name("object", name, self._numbers)
+        return self._numbers[name]
 
     def with_object(self, name: str, **changes: object) -> Scene:
         """The same scene with other values for fields of the object called ``name``.
@@ -343,7 +374,8 @@ class Scene:
         if not {"mesh", "shape", "params"} & set(changes):
             changed.share_geometry(self.objects[number].geometry)
         objects = (*self.objects[:number], changed, *self.objects[number + 1 :])
-        return self._laid_out_alike(dataclasses.replace(self, objects=objects))
+        layout = self.layout.with_object(number, changed.geometry, changed.world_from_object())
+        return self._laid_out_alike(dataclasses.replace(self, objects=objects), layout)
 
     @property
     def environment_image(self) -> StoredPicture | None:

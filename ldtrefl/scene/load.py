@@ -24,6 +24,9 @@ from ldtrefl.scene.toml_text import read_toml
 
 MESH_PATH_VARIABLE = "LDTREFL_MESH_PATH"
 
+OBJECT_BYTES = 8 << 10
+"""An object of a scene, without its mesh and pictures: what Python and the device keep of it."""
+
 Result = TypeVar("Result")
 
 _ADAPTER = TypeAdapter(Scene)
@@ -63,31 +66,45 @@ def load_scene(path: str | Path) -> Scene:
 
 def _found(scene: Scene, path: Path) -> Scene:
     """The scene with every file found and read; a fault names the key."""
+    count = len(scene.objects)
+    _at(path, "object", lambda: budget.take(OBJECT_BYTES * count, f"a list of {count}"))
     # What several objects share is made once, and so is taken from the budget once.
     meshes: dict[tuple[str | None, str, str], Mesh] = {}
     objects = [_found_object(entry, f"object[{index}]", path, meshes) for index, entry in enumerate(scene.objects)]
     environment = _found_environment(scene.environment, path)
-    return dataclasses.replace(scene, objects=tuple(objects), environment=environment)
+    found = dataclasses.replace(scene, objects=tuple(objects), environment=environment)
+    try:
+        found.layout  # noqa: B018  (it refuses sizes that are not allowed)
+    except InputError as error:
+        raise error.within(str(path)) from None
+    return found
 
 
 def _found_object(entry: Object, key: str, path: Path, meshes: dict[tuple[str | None, str, str], Mesh]) -> Object:
     """An object with its mesh and texture read; ``meshes`` are those of the objects before it, and its own is added."""
-    mesh = _beside(path, entry.mesh, f"{key}.mesh") if isinstance(entry.mesh, str) else entry.mesh
-    material = entry.material
-    if material.texture is not None:
-        texture = _beside(path, material.texture, f"{key}.material.texture")
-        material = dataclasses.replace(material, texture=texture)
-    found = dataclasses.replace(entry, mesh=mesh, material=material)
-    source = entry.shape, str(mesh), json.dumps(entry.params, sort_keys=True, default=str)
+    found = _with_files_found(entry, key, path)
+    source = found.shape, str(found.mesh), json.dumps(found.params, sort_keys=True, default=str)
     if source in meshes:
         found.share_geometry(meshes[source])
-    kind = "mesh" if entry.shape is None else "shape"
-    meshes[source] = _at(path, f"{key}.{kind}", lambda: found.geometry)
-    picture = _at(path, f"{key}.material.texture", lambda: found.texture)
-    if picture is not None and found.geometry.uvs is None:
-        raise InputError(f"{path}: {key}.material.texture: the object has no texture coordinates (UVs)")
-    _at(path, key, found.world_from_object)
+    else:
+        kind = "mesh" if entry.shape is None else "shape"
+        meshes[source] = _at(path, f"{key}.{kind}", lambda: found.geometry)
+    if found.material.texture is not None:
+        _at(path, f"{key}.material.texture", lambda: found.texture)
+        if found.geometry.uvs is None:
+            raise InputError(f"{path}: {key}.material.texture: the object has no texture coordinates (UVs)")
     return found
+
+
+def _with_files_found(entry: Object, key: str, path: Path) -> Object:
+    """An object with the paths of the files that it names."""
+    changes: dict[str, Any] = {}
+    if isinstance(entry.mesh, str):
+        changes["mesh"] = _beside(path, entry.mesh, f"{key}.mesh")
+    if entry.material.texture is not None:
+        texture = _beside(path, entry.material.texture, f"{key}.material.texture")
+        changes["material"] = dataclasses.replace(entry.material, texture=texture)
+    return dataclasses.replace(entry, **changes) if changes else entry
 
 
 def _found_environment(environment: Environment, path: Path) -> Environment:

@@ -1,12 +1,15 @@
-"""Where an object stands: fit, then scale, rotate, translate."""
+"""Where objects stand: fit, then scale, rotate, translate. Many objects are placed at once."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ldtrefl.base.checked import LARGEST, SMALLEST
 from ldtrefl.base.errors import InputError
+
+_IDENTITY = np.eye(4)
+_QUARTERS = np.array([(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)])
+"""Cosine and sine of whole quarter turns."""
 
 
 def placement(
@@ -16,55 +19,98 @@ def placement(
     rotate: tuple[float, float, float, float],
     translate: tuple[float, float, float],
 ) -> np.ndarray:
-    """``world_from_object``, (4, 4) float64.
-
-    Args:
-        bounds: (2, 3), the lowest and highest corner of the mesh's box.
-        fit: centre the box at 0 and scale its longest side to this, first; None to leave the mesh as it is.
-        scale: one factor, or one for each axis.
-        rotate: axis and degrees.
-        translate: in the world.
+    """``world_from_object``, (4, 4) float64, of one object; :func:`placements` says what is what.
 
     Raises:
-        InputError: they give a size along an axis that is not allowed.
+        InputError: its size along an axis is not allowed.
     """
-    low, high = bounds
-    side = float((high - low).max())
-    matrix = np.eye(4)
-    with np.errstate(all="ignore"):  # what is not finite is refused below
-        if fit is not None:
-            matrix = _scaling(fit / side if side > 0.0 else 1.0) @ _translation(-(low + (high - low) / 2))
-        matrix = _translation(translate) @ _rotation(rotate) @ _scaling(scale) @ matrix
-        sizes = np.linalg.norm(matrix[:3, :3] * (side or 1.0), axis=0)
-    if not (np.isfinite(matrix).all() and SMALLEST <= sizes.min() and sizes.max() <= LARGEST):
+    fitted, scales = np.array([np.nan if fit is None else fit]), np.broadcast_to(scale, (1, 3)).astype(float)
+    matrices = placements(bounds[None], fitted, scales, np.array([rotate], float), np.array([translate], float))
+    if len(wrong_sizes(matrices, bounds[None])):
+        (side,), sizes = _longest_sides(bounds[None]), _sizes(matrices, bounds[None])
         given = "" if fit is None else f"fit {fit:g}, "
         raise InputError(
             f"{given}scale {scale} and the mesh's own size of {side:g} give a size of {sizes.min():g} to "
             f"{sizes.max():g} along its axes, allowed are {SMALLEST:g} to {LARGEST:g}"
         )
-    return matrix
+    return matrices[0]
 
 
-def _translation(offset: ArrayLike) -> np.ndarray:
-    matrix = np.eye(4)
-    matrix[:3, 3] = offset
-    return matrix
+def placements(
+    bounds: np.ndarray, fit: np.ndarray, scale: np.ndarray, rotate: np.ndarray, translate: np.ndarray
+) -> np.ndarray:
+    """``world_from_object`` of n objects, (n, 4, 4) float64; some may not be allowed (:func:`wrong_sizes`).
+
+    Args:
+        bounds: (n, 2, 3), the lowest and highest corner of each mesh's box.
+        fit: (n,), centre the box at 0 and scale its longest side to this, first; NaN to leave the mesh as it is.
+        scale: (n, 3), a factor for each axis.
+        rotate: (n, 4), axis and degrees.
+        translate: (n, 3), in the world.
+    """
+    low, high = bounds[:, 0], bounds[:, 1]
+    side = _longest_sides(bounds)
+    with np.errstate(all="ignore"):  # what is not finite is not allowed
+        factor = np.divide(fit, side, out=np.ones_like(fit), where=side > 0.0)
+        fitted = _scalings(np.repeat(factor[:, None], 3, axis=1)) @ _translations(-(low + (high - low) / 2))
+        matrices = np.where(np.isnan(fit)[:, None, None], _IDENTITY, fitted)
+        return _translations(translate) @ _rotations(rotate) @ _scalings(scale) @ matrices
 
 
-def _scaling(factor: ArrayLike) -> np.ndarray:
-    return np.diag([*np.broadcast_to(factor, 3), 1.0]).astype(float)
+def wrong_sizes(matrices: np.ndarray, bounds: np.ndarray) -> np.ndarray:
+    """Numbers of the objects whose size along an axis is not allowed, from their (n, 4, 4) placements."""
+    sizes = _sizes(matrices, bounds)
+    allowed = np.isfinite(matrices).all(axis=(1, 2)) & ((sizes >= SMALLEST) & (sizes <= LARGEST)).all(axis=1)
+    return np.flatnonzero(~allowed)
 
 
-def _rotation(axis_and_degrees: tuple[float, float, float, float]) -> np.ndarray:
+def _longest_sides(bounds: np.ndarray) -> np.ndarray:
+    """(n,) longest side of each box."""
+    return (bounds[:, 1] - bounds[:, 0]).max(axis=1)
+
+
+def _sizes(matrices: np.ndarray, bounds: np.ndarray) -> np.ndarray:
+    """(n, 3) lengths in the world, along each object's own axes, of its box's longest side."""
+    side = _longest_sides(bounds)
+    with np.errstate(all="ignore"):
+        columns = matrices[:, :3, :3] * np.where(side > 0.0, side, 1.0)[:, None, None]
+        return np.sqrt((columns**2).sum(axis=1))
+
+
+def _identities(count: int) -> np.ndarray:
+    matrices = np.empty((count, 4, 4))
+    matrices[:] = _IDENTITY
+    return matrices
+
+
+def _translations(offsets: np.ndarray) -> np.ndarray:
+    matrices = _identities(len(offsets))
+    matrices[:, :3, 3] = offsets
+    return matrices
+
+
+def _scalings(factors: np.ndarray) -> np.ndarray:
+    matrices = _identities(len(factors))
+    for axis in range(3):
+        matrices[:, axis, axis] = factors[:, axis]
+    return matrices
+
+
+def _rotations(axes_and_degrees: np.ndarray) -> np.ndarray:
     """Rodrigues' formula."""
-    axis = np.asarray(axis_and_degrees[:3], float)
-    x, y, z = axis / np.linalg.norm(axis)
+    axes = axes_and_degrees[:, :3]
+    axes = axes / np.sqrt(np.vecdot(axes, axes))[:, None]
     # Whole quarter turns must be exact, so that they only permute axes.
-    degrees = axis_and_degrees[3] % 360.0
-    quarters = {0.0: (1.0, 0.0), 90.0: (0.0, 1.0), 180.0: (-1.0, 0.0), 270.0: (0.0, -1.0)}
-    cosine, sine = quarters.get(degrees, (np.cos(np.radians(degrees)), np.sin(np.radians(degrees))))
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    along = np.outer([x, y, z], [x, y, z])
-    matrix = np.eye(4)
-    matrix[:3, :3] = cosine * np.eye(3) + sine * cross + (1 - cosine) * along
-    return matrix
+    degrees = axes_and_degrees[:, 3] % 360.0
+    cosine, sine = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    is_quarter = degrees % 90.0 == 0.0
+    cosine[is_quarter], sine[is_quarter] = _QUARTERS[(degrees[is_quarter] / 90.0).astype(int) % 4].T
+    x, y, z = axes.T
+    cross = np.zeros((len(axes), 3, 3))
+    cross[:, 0, 1], cross[:, 0, 2], cross[:, 1, 2] = -z, y, -x
+    cross[:, 1, 0], cross[:, 2, 0], cross[:, 2, 1] = z, -y, x
+    along = axes[:, :, None] * axes[:, None, :]
+    cosine, sine = cosine[:, None, None], sine[:, None, None]
+    matrices = _identities(len(axes))
+    matrices[:, :3, :3] = cosine * _IDENTITY[:3, :3] + sine * cross + (1 - cosine) * along
+    return matrices

@@ -76,6 +76,26 @@ def test_a_picture_is_read_once_however_objects_move(tmp_path: Path) -> None:
     assert scene.with_object("a", scale=2.0).objects[0].texture is picture is not None
 
 
-def test_the_corners_of_a_turned_box_are_its_own() -> None:
-    corners = Object(shape="plane", rotate=(0, 0, 1, 45.0)).world_corners()
-    assert np.abs(corners).max() == pytest.approx(np.sqrt(2.0)) and (corners[:, 2] == 0.0).all()
+def test_equal_shapes_and_files_have_one_mesh_and_are_asked_for_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[str] = []
+    make = shapes.make
+    monkeypatch.setattr(shapes, "make", lambda name, params: asked.append(name) or make(name, params))
+    fine = {"segments": [32, 16]}
+    objects = tuple(Object(shape="sphere", params=params, scale=scale) for params in ({}, fine) for scale in (1, 2, 3))
+    scene = Scene(camera=CAMERA, objects=objects)
+    assert len(scene.layout.meshes) == 2 and scene.layout.mesh_of.tolist() == [0, 0, 0, 1, 1, 1]
+    assert asked == ["sphere", "sphere"]
+    assert all(entry.geometry is scene.layout.meshes[k // 3] for k, entry in enumerate(objects))
+
+
+def test_the_object_that_has_no_allowed_size_is_named() -> None:
+    objects = (Object(shape="box"), Object(shape="box", fit=1e15, scale=10.0), Object(shape="box"))
+    with pytest.raises(ldtrefl.InputError, match=r"^object\[1\]: fit 1e\+15, scale 10.0 and the mesh's own size of 2"):
+        ldtrefl.render(Scene(camera=CAMERA, objects=objects))
+
+
+def test_the_first_of_several_objects_of_one_name_is_meant() -> None:
+    objects = tuple(Object(name=name, shape="box") for name in ("a", "b", "b"))
+    scene = Scene(camera=CAMERA, objects=objects)
+    assert scene.number_of("b") == 1
+    assert [entry.translate[0] for entry in scene.with_object("b", translate=(1, 0, 0)).objects] == [0.0, 1.0, 0.0]

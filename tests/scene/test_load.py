@@ -6,6 +6,7 @@ import pytest
 
 import ldtrefl
 from ldtrefl.base import budget
+from ldtrefl.scene.load import OBJECT_BYTES
 from tests.conftest import SMALL_SCENE
 
 THING = 'shape = "torus"\nparams = { segments = [16, 8] }'
@@ -120,10 +121,19 @@ def test_a_scene_adds_up_and_counts_what_is_shared_once(tmp_path: Path) -> None:
     path.write_text(twice)
     with budget.account() as two:
         second = ldtrefl.load_scene(path)
-    assert one.taken == again.taken == two.taken > 0
+    assert one.taken == again.taken == two.taken - 2 * OBJECT_BYTES > 0
     assert second.objects[0].geometry is second.objects[2].geometry is first.objects[0].geometry
-    budget.set_memory_limit(one.taken)
+    budget.set_memory_limit(two.taken)
     ldtrefl.load_scene(path)
-    budget.set_memory_limit(one.taken - 1)
+    budget.set_memory_limit(two.taken - 1)
     with pytest.raises(ldtrefl.InputError, match=r"object\[1\]\.shape: .* for the rest of the scene, allowed are"):
+        ldtrefl.load_scene(path)
+
+
+def test_objects_count_without_their_meshes_too(tmp_path: Path) -> None:
+    """A file of four megabytes holds more than a hundred thousand."""
+    path = tmp_path / "scene.toml"
+    path.write_text(SMALL_SCENE + '[[object]]\nshape="box"\n' * 2000)
+    budget.set_memory_limit(2000 * OBJECT_BYTES)
+    with pytest.raises(ldtrefl.InputError, match=r"scene\.toml: object: a list of 2002 needs 15\.6 MiB, allowed"):
         ldtrefl.load_scene(path)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import ldtrefl
-from ldtrefl.scene.placement import placement
+from ldtrefl.scene.placement import placement, placements, wrong_sizes
 
 BOUNDS = np.array([[1.0, 2.0, 3.0], [2.0, 4.0, 7.0]])
 STILL = (0.0, 0.0, 1.0, 0.0)
@@ -42,3 +42,20 @@ def test_any_turn_keeps_lengths_and_its_axis() -> None:
 def test_a_size_that_is_not_allowed_is_refused(fit: float | None, scale: float) -> None:
     with pytest.raises(ldtrefl.InputError, match=r"the mesh's own size of 4 give a size of .* along its axes, allowed"):
         placement(BOUNDS, fit, scale, STILL, (0.0, 0.0, 0.0))
+
+
+def test_many_are_placed_as_each_alone_and_wrong_ones_are_found() -> None:
+    rng = np.random.default_rng(0)
+    count, low = 50, rng.normal(size=(50, 3))
+    bounds = np.stack([low, low + rng.uniform(0.1, 1.0, (count, 3))], axis=1)
+    fit = np.where(rng.random(count) < 0.5, np.nan, rng.uniform(0.5, 2.0, count))
+    scale, translate = rng.uniform(0.5, 2.0, (count, 3)), rng.normal(size=(count, 3))
+    rotate = np.concatenate([rng.normal(size=(count, 3)), rng.choice([0.0, 90.0, 33.0, -400.0], (count, 1))], axis=1)
+    matrices = placements(bounds, fit, scale, rotate, translate)
+    for k in range(count):
+        given = None if np.isnan(fit[k]) else float(fit[k])
+        values = [tuple(row[k].tolist()) for row in (scale, rotate, translate)]
+        np.testing.assert_array_equal(matrices[k], placement(bounds[k], given, *values))
+    assert len(wrong_sizes(matrices, bounds)) == 0
+    scale[7, 1], scale[30] = 1e-20, 1e20
+    assert wrong_sizes(placements(bounds, fit, scale, rotate, translate), bounds).tolist() == [7, 30]

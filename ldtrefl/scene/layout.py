@@ -1,0 +1,81 @@
+"""Where all objects of a scene stand, and which mesh each has: found at once, however many there are."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import chain
+
+import numpy as np
+
+from ldtrefl.scene.mesh import Mesh
+from ldtrefl.scene.placement import placements, wrong_sizes
+
+CORNERS = np.array(np.meshgrid([0, 1], [0, 1], [0, 1])).reshape(3, -1).T
+"""(8, 3): of a box's corners, along each axis 0 for its low and 1 for its high side."""
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """The meshes and places of n objects."""
+
+    meshes: tuple[Mesh, ...]
+    """Each mesh once."""
+    mesh_of: np.ndarray
+    """(n,) int64: the number of each object's mesh."""
+    world_from_object: np.ndarray
+    """(n, 4, 4) float64."""
+
+    @classmethod
+    def of(
+        cls,
+        meshes: Sequence[Mesh],
+        fit: Sequence[float | None],
+        scale: Sequence[float | tuple[float, float, float]],
+        rotate: Sequence[tuple[float, float, float, float]],
+        translate: Sequence[tuple[float, float, float]],
+    ) -> Layout:
+        """Lay out objects, given the mesh of each and how it is placed; some may not be allowed (``wrong``)."""
+        numbers = {mesh: number for number, mesh in enumerate(dict.fromkeys(meshes))}
+        mesh_of = np.fromiter(map(numbers.__getitem__, meshes), np.int64, len(meshes))
+        bounds = np.array([mesh.bounds for mesh in numbers]).reshape(-1, 2, 3)[mesh_of]
+        fitted = np.array([np.nan if side is None else side for side in fit], float)
+        scales = [factor if isinstance(factor, tuple) else (factor,) * 3 for factor in scale]
+        matrices = placements(bounds, fitted, _rows(scales, 3), _rows(rotate, 4), _rows(translate, 3))
+        return cls(tuple(numbers), mesh_of, matrices)
+
+    @property
+    def wrong(self) -> np.ndarray:
+        """Numbers of the objects whose size along an axis is not allowed."""
+        return wrong_sizes(self.world_from_object, self._bounds[self.mesh_of])
+
+    def with_object(self, number: int, mesh: Mesh, world_from_object: np.ndarray) -> Layout:
+        """The same but for one object."""
+        meshes, mesh_of = self.meshes, self.mesh_of
+        if mesh is not meshes[mesh_of[number]]:
+            meshes, mesh_of = (*meshes, mesh), mesh_of.copy()
+            mesh_of[number] = len(meshes) - 1
+        matrices = self.world_from_object.copy()
+        matrices[number] = world_from_object
+        return Layout(meshes, mesh_of, matrices)
+
+    @functools.cached_property
+    def box(self) -> np.ndarray:
+        """(2, 3) float64: the lowest and highest corner of the box about all meshes' boxes in the world."""
+        if not self.meshes:
+            return np.array([[-1.0] * 3, [1.0] * 3])
+        corners = np.where(CORNERS == 0, self._bounds[:, :1], self._bounds[:, 1:])
+        corners = np.concatenate([corners, np.ones((len(corners), 8, 1))], axis=2)[self.mesh_of]
+        placed = (corners @ self.world_from_object.transpose(0, 2, 1))[..., :3].reshape(-1, 3)
+        return np.stack([placed.min(axis=0), placed.max(axis=0)])
+
+    @property
+    def _bounds(self) -> np.ndarray:
+        """(meshes, 2, 3) the lowest and highest corner of each mesh's box."""
+        return np.array([mesh.bounds for mesh in self.meshes]).reshape(-1, 2, 3)
+
+
+def _rows(values: Sequence[Sequence[float]], width: int) -> np.ndarray:
+    """(n, width) float64."""
+    return np.fromiter(chain.from_iterable(values), float, width * len(values)).reshape(-1, width)
