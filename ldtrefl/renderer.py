@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 import warp as wp
+from numpy.typing import ArrayLike
 
 from ldtrefl.base import budget
 from ldtrefl.base.errors import InputError
@@ -106,9 +107,28 @@ class Renderer:
         given = {"translate": translate, "rotate": rotate, "scale": scale}
         changes = {key: value for key, value in given.items() if value is not None}
         with self._lock:
-            before = self._device_scene
-            scene = before.scene.with_object(name, **changes)
-            self._device_scene = DeviceScene(scene, before.device, before, skip_attributes=self._skip.attributes)
+            self._go_on_with(self._device_scene.scene.with_object(name, **changes))
+
+    def update_vertices(self, name: str, vertices: ArrayLike) -> None:
+        """Deform the object called ``name``: its mesh gets these vertices, for the same faces.
+
+        Its normals are made anew from the faces, its maps and trees when they are next needed; ``fit`` places it as
+        before. Other objects with the same mesh stay as they are.
+
+        Args:
+            name: the object.
+            vertices: (n, 3) numbers in the object's own coordinates, as many as it has.
+
+        Raises:
+            InputError: an unknown object, more or fewer vertices, or one that is not finite.
+        """
+        with self._lock:
+            self._go_on_with(self._device_scene.scene.with_vertices(name, vertices))
+
+    def _go_on_with(self, scene: Scene) -> None:
+        """Take a scene that comes from this one by a change of an object."""
+        before = self._device_scene
+        self._device_scene = DeviceScene(scene, before.device, before, skip_attributes=self._skip.attributes)
 
     def render(self, camera: Camera | None = None) -> Frame:
         """Render a frame, seen by ``camera`` or else by the scene's own.

@@ -83,7 +83,10 @@ class SceneMaps:
                     maps[key] = self._peeled(key, stats)
                 maps[key] = maps.pop(key)  # used last
             # Whatever was peeled for other frames has no part in this one.
-            current = {mesh: maps.get(self._key(mesh, mesh in mirrors)) for mesh in _meshes(scene)}
+            meshes = _meshes(scene)
+            for key in [key for key in maps if key.mesh not in meshes]:
+                del maps[key]  # of a mesh that has been deformed since
+            current = {mesh: maps.get(self._key(mesh, mesh in mirrors)) for mesh in meshes}
             if self._bound is None or self._bound.maps != current:
                 self._bound = self._bind(scene, current)
         return self._bound.tracer

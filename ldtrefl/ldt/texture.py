@@ -120,7 +120,7 @@ class LayeredDepthTexture:
     def _cached_or_made(self, kind: str, make: Callable[[], Made], read: Callable[[Entry], Made]) -> Made:
         """What the cache in use has, or else what is made now, and then kept there."""
         cache, mesh = current_cache(), self.geometry.mesh
-        if cache is None or len(mesh.faces) < WORTH_CACHING:
+        if cache is None or mesh.is_deformed or len(mesh.faces) < WORTH_CACHING:
             return make()
         options = {"kind": kind, "resolution": self.resolution, "quality": self.quality, "trusted": self.trusted}
         key = key_of(mesh.surface_key, {**options, "algorithm": fingerprint("ldt.texture")})

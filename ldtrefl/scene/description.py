@@ -14,6 +14,7 @@ from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 from pydantic import BeforeValidator, Field, ValidatorFunctionWrapHandler, WrapValidator, model_validator
 from pydantic.dataclasses import dataclass
 
@@ -247,7 +248,7 @@ class Object:
 
     @functools.cached_property
     def _world_from_object(self) -> np.ndarray:
-        return placement(self.geometry.bounds, self.fit, self.scale, self.rotate, self.translate)
+        return placement(self.geometry.fit_bounds, self.fit, self.scale, self.rotate, self.translate)
 
 
 PLACED_BY = ("geometry", "fit", "scale", "rotate", "translate")
@@ -376,6 +377,19 @@ class Scene:
         objects = (*self.objects[:number], changed, *self.objects[number + 1 :])
         layout = self.layout.with_object(number, changed.geometry, changed.world_from_object())
         return self._laid_out_alike(dataclasses.replace(self, objects=objects), layout)
+
+    def with_vertices(self, name: str, vertices: ArrayLike) -> Scene:
+        """The same scene with the mesh of the object called ``name`` deformed: (n, 3) vertices, for the same faces.
+
+        Raises:
+            InputError: an unknown object, more or fewer vertices than it has, or one that is not finite.
+        """
+        entry = self.objects[self.number_of(name)]
+        try:
+            mesh = entry.geometry.with_vertices(vertices)
+        except InputError as error:
+            raise error.within(f"object '{name}'") from None
+        return self.with_object(name, mesh=mesh, shape=None, params={})
 
     @property
     def environment_image(self) -> StoredPicture | None:

@@ -39,7 +39,7 @@ class Layout:
         """Lay out objects, given the mesh of each and how it is placed; some may not be allowed (``wrong``)."""
         numbers = {mesh: number for number, mesh in enumerate(dict.fromkeys(meshes))}
         mesh_of = np.fromiter(map(numbers.__getitem__, meshes), np.int64, len(meshes))
-        bounds = np.array([mesh.bounds for mesh in numbers]).reshape(-1, 2, 3)[mesh_of]
+        bounds = np.array([mesh.fit_bounds for mesh in numbers]).reshape(-1, 2, 3)[mesh_of]
         fitted = np.array([np.nan if side is None else side for side in fit], float)
         scales = [factor if isinstance(factor, tuple) else (factor,) * 3 for factor in scale]
         matrices = placements(bounds, fitted, _rows(scales, 3), _rows(rotate, 4), _rows(translate, 3))
@@ -53,7 +53,10 @@ class Layout:
     def with_object(self, number: int, mesh: Mesh, world_from_object: np.ndarray) -> Layout:
         """The same but for one object."""
         meshes, mesh_of = self.meshes, self.mesh_of
-        if mesh is not meshes[mesh_of[number]]:
+        before = mesh_of[number]
+        if mesh is not meshes[before] and np.count_nonzero(mesh_of == before) == 1:
+            meshes = (*meshes[:before], mesh, *meshes[before + 1 :])  # nothing else has the mesh of before
+        elif mesh is not meshes[before]:
             meshes, mesh_of = (*meshes, mesh), mesh_of.copy()
             mesh_of[number] = len(meshes) - 1
         matrices = self.world_from_object.copy()

@@ -84,6 +84,10 @@ class Mesh:
         self.uvs = self._of_vertices(uvs, 2, "uvs")
         """(n, 2) float32 texture coordinates, v = 0 at the bottom row; None if none were given."""
         self.parts = parts
+        self.fit_bounds = self.bounds
+        """(2, 3) float64: the box by which an object's ``fit`` places the mesh; that before it was deformed."""
+        self.is_deformed = False
+        """Whether its vertices have been moved: what is made of it serves for a frame, and is not kept on disk."""
         for array in (self.vertices, self.faces, self.is_used, self.bounds):
             array.flags.writeable = False
 
@@ -103,9 +107,23 @@ class Mesh:
             InputError: there are more or fewer normals than vertices.
         """
         mesh = Mesh.__new__(Mesh)
-        for name in ("vertices", "faces", "is_used", "bounds", "uvs", "parts"):
+        for name in ("vertices", "faces", "is_used", "bounds", "uvs", "parts", "fit_bounds", "is_deformed"):
             setattr(mesh, name, getattr(self, name))
         mesh.stored_normals = mesh._of_vertices(normals, 3, "normals")
+        return mesh
+
+    def with_vertices(self, vertices: ArrayLike) -> Mesh:
+        """The same mesh, deformed: with these vertices, (n, 3), and normals made from its faces. ``fit`` places it as
+        before.
+
+        Raises:
+            InputError: there are more or fewer vertices than before, or one is not finite.
+        """
+        given = _coordinates(vertices)
+        if len(given) != len(self.vertices):
+            raise InputError(f"{len(given)} vertices in place of {len(self.vertices)}")
+        mesh = Mesh(given, self.faces, uvs=self.uvs, parts=self.parts)
+        mesh.fit_bounds, mesh.is_deformed = self.fit_bounds, True
         return mesh
 
     @functools.cached_property

@@ -8,21 +8,30 @@ from __future__ import annotations
 from ldtrefl.device.stats import Stats
 from ldtrefl.tracing.bvh import BVH, BvhView, Raycaster
 from ldtrefl.tracing.tracer import BoundTracer, array_of_views
+from ldtrefl.world.device_mesh import DeviceMesh
 from ldtrefl.world.device_scene import DeviceScene
 
 
 class SceneBvh:
-    """A ``SceneTracer`` that builds the BVHs of all meshes when the first is needed."""
+    """A ``SceneTracer`` that builds the BVHs of all meshes when the first is needed.
+
+    A deformed mesh is another mesh, and gets a tree of its own. To refit the old one would be faster, but the picture
+    would then depend on what was rendered before.
+    """
 
     def __init__(self) -> None:
+        self._trees: dict[DeviceMesh, Raycaster] = {}
+        self._meshes: list[DeviceMesh] = []
+        """Of each object, when the tracer was bound."""
         self._bound: BoundTracer | None = None
 
     def bound(self, scene: DeviceScene, objects: set[int], stats: Stats) -> BoundTracer:
-        """The tracer over all objects, of this scene and of all that come from it by moves."""
-        if self._bound is None:
+        """The tracer over all objects."""
+        meshes = [entry.geometry for entry in scene.objects]
+        if self._bound is None or self._meshes != meshes:
             with stats.stage("build", scene.device):
-                meshes = dict.fromkeys(entry.geometry for entry in scene.objects)
-                trees = {mesh: Raycaster.of(mesh) for mesh in meshes}
-                views = [trees[entry.geometry].view() for entry in scene.objects]
-                self._bound = BoundTracer(BVH, array_of_views(views, BvhView, scene.device), list(trees.values()))
+                self._trees = {mesh: self._trees.get(mesh) or Raycaster.of(mesh) for mesh in dict.fromkeys(meshes)}
+                views = {mesh: tree.view() for mesh, tree in self._trees.items()}
+                listed = array_of_views([views[mesh] for mesh in meshes], BvhView, scene.device)
+                self._bound, self._meshes = BoundTracer(BVH, listed, list(self._trees.values())), meshes
         return self._bound
