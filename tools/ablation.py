@@ -299,9 +299,9 @@ def rays_that_enter(renderer: Renderer) -> int:
     origin, direction = rays.origin.numpy().astype(float), rays.direction.numpy().astype(float)
     source = rays.source.numpy()
     for entry in renderer.gbuffer.scene.objects:
-        offset = np.array(entry.record.centre, float) - origin
+        offset = entry.centre - origin
         along = (offset * direction).sum(axis=1)
-        square, radius = (offset**2).sum(axis=1), float(entry.record.radius)
+        square, radius = (offset**2).sum(axis=1), entry.radius
         meets = (square <= radius**2) | ((square - along**2 <= radius**2) & (along > 0))
         count += int((meets & (source != entry.index)).sum())
     return count

@@ -64,9 +64,9 @@ def footprint(rays: RayArrays, width: int, runs: np.ndarray, entry: DeviceObject
     numbers = numbers[numbers % max(1, len(pixel) // CANDIDATES) == 0]
     may_meet = (source[numbers] != entry.index) | (rays.may_return[numbers] != 0)
     numbers = numbers[(source[numbers] >= 0) & may_meet]
-    offset = np.array(entry.record.centre, float) - origin[numbers]
+    offset = entry.centre - origin[numbers]
     along = (offset * direction[numbers]).sum(axis=1)
-    meets = (along > 0.0) & ((offset**2).sum(axis=1) - along**2 <= (SURELY * float(entry.record.radius)) ** 2)
+    meets = (along > 0.0) & ((offset**2).sum(axis=1) - along**2 <= (SURELY * entry.radius) ** 2)
     chosen = np.flatnonzero(meets)
     chosen = chosen[:: max(1, len(chosen) // SAMPLES)]
     numbers, along = numbers[chosen], along[chosen]

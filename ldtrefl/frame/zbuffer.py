@@ -100,17 +100,16 @@ def draw_large_triangles(
 
 def empty_corners(scene: DeviceScene) -> wp.array:
     """(all objects' vertices,) vec3d, not filled yet."""
-    return wp.empty(scene.vertex_count, dtype=wp.vec3d, device=scene.device)
+    return wp.empty(int(scene.vertex_counts.sum()), dtype=wp.vec3d, device=scene.device)
 
 
 def project(scene: DeviceScene, camera: Camera, numbers: Sequence[int], corners: wp.array) -> None:
     """Find the corners, in pixels of the whole image, of the objects of these numbers."""
-    entries, device, from_world = [scene.objects[k] for k in numbers], scene.device, pixels_from_world(camera)
-    if not entries:
+    if not len(numbers):
         return
-    rows = np.array([from_world @ entry.world_from_unit for entry in entries]).reshape(-1, 4)
-    counts = np.array([entry.vertex_count for entry in entries])
-    chunks, count = chunks_of(np.array(numbers), counts, device)
+    listed, device = np.array(numbers), scene.device
+    rows = (pixels_from_world(camera) @ scene.world_from_unit[listed]).reshape(-1, 4)
+    chunks, count = chunks_of(listed, scene.vertex_counts[listed], device)
     inputs = [chunks, scene.records, wp.array(rows, dtype=wp.vec4d, device=device), corners]
     launch.launch(project_vertices, count, inputs, device)
 
@@ -146,8 +145,9 @@ class Drawing:
 
     def draw(self, scene: DeviceScene, camera: Camera, numbers: Sequence[int]) -> None:
         """Draw the objects of these numbers, whose corners are known."""
-        device, counts = scene.device, np.array([scene.objects[k].triangle_count for k in numbers], np.int64)
-        chunks, count = chunks_of(np.array(numbers, np.int64), counts, device)
+        device, drawn = scene.device, np.array(numbers, np.int64)
+        counts = scene.triangle_counts[drawn]
+        chunks, count = chunks_of(drawn, counts, device)
         large = wp.zeros(1, dtype=wp.int32, device=device)
         listed = wp.empty(int(counts.sum()), dtype=wp.int32, device=device)
         target = [scene.records, self.corners, camera.width, self.band.first_row, self.band.first_row + self.band.rows]

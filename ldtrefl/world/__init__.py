@@ -2,7 +2,8 @@
 
     device_scene.py     all of it
     records.py          the structs that kernels read, and the three spaces
-    device_space.py     device space; device_object.py places an object in it
+    device_space.py     device space; bounding_spheres.py of the objects in it
+    device_object.py    an object as the host sees it; object_records.py fills in what kernels read
     device_mesh.py      a mesh's arrays; outliers.py its triangles that are tested in float64
     appearance.py       colours and textures; lighting.py lights and environment
     camera.py           the camera as kernels see it

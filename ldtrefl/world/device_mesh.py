@@ -28,6 +28,12 @@ class DeviceMesh:
         """By key of the texture."""
 
     @functools.cached_property
+    def reach(self) -> float:
+        """How far from the centre of its box the mesh reaches, in unit space."""
+        used = self.mesh.unit_vertices[self.mesh.is_used].astype(float)
+        return float(np.sqrt((used**2).sum(axis=1).max()))
+
+    @functools.cached_property
     def outliers(self) -> Outliers:
         """The mesh's triangles far outside its bulk."""
         return outliers_of(self.mesh, self.vertices.device)

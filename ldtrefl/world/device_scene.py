@@ -1,13 +1,16 @@
 """The scene on a device, as kernels see it: objects, lights and the camera's ``up``.
 
 ``records.py`` says what kernels read and names the three spaces; ``device_space.py`` fixes device space;
-``device_mesh.py`` uploads a mesh, which objects share; ``device_object.py`` places an object; ``appearance.py`` and
-``lighting.py`` hold colours, textures, lights and the environment. A moved object moves its rays, never its maps.
+``device_mesh.py`` uploads a mesh, which objects share; ``object_records.py`` fills in what kernels read of objects;
+``appearance.py`` and ``lighting.py`` hold colours, textures, lights and the environment. A moved object moves its rays,
+never its maps. What is done for each object is done for all at once, in numpy.
 """
 
 from __future__ import annotations
 
 import functools
+import itertools
+import operator
 
 import numpy as np
 import warp as wp
@@ -15,11 +18,13 @@ import warp as wp
 from ldtrefl.base.errors import InputError
 from ldtrefl.files.srgb import linear_of_bytes
 from ldtrefl.scene.description import Camera, Scene
+from ldtrefl.world.bounding_spheres import bounding_radii
 from ldtrefl.world.camera import unit_up
 from ldtrefl.world.device_mesh import DeviceMesh
-from ldtrefl.world.device_object import DeviceObject, set_geometry, set_material, world_from_unit
+from ldtrefl.world.device_object import DeviceObject, DeviceObjects
 from ldtrefl.world.device_space import device_space
 from ldtrefl.world.lighting import lighting_of
+from ldtrefl.world.object_records import object_records, set_places
 from ldtrefl.world.records import LightingRecord, ObjectRecord
 from ldtrefl.world.top_level import TopLevel, order_of, top_level
 
@@ -51,10 +56,10 @@ class DeviceScene:
         self._top_order: np.ndarray | None = None if before is None else before._top_order
         self._decoded = wp.array(linear_of_bytes(), dtype=float, device=device, copy=False)
         self.device_from_world = device_space(scene.layout_box)
-        meshes = self._device_meshes(before)
-        self.vertex_count = _counted_vertices(meshes)
-        self.objects = self._placed_objects(meshes, before)
-        self.records = wp.array([entry.record for entry in self.objects], dtype=ObjectRecord, device=device)
+        if before is not None and before.scene.layout.has_meshes_of(scene.layout):
+            self._take_over(before)
+        else:
+            self._place_all(before)
         same_picture = before is not None and before.scene.environment is scene.environment
         lighting_before: LightingRecord | None = before.lighting if before is not None and same_picture else None
         self.lighting: LightingRecord = lighting_of(
@@ -62,66 +67,113 @@ class DeviceScene:
         )
         self.look_from(scene.camera)
 
-    def _device_meshes(self, before: DeviceScene | None) -> list[DeviceMesh]:
-        """Each object's mesh. Equal meshes are one, and those of ``before`` are taken over."""
-        known = {} if before is None else {entry.geometry.mesh.key: entry.geometry for entry in before.objects}
-        for mesh in (source.geometry for source in self.scene.objects):
+    def _place_all(self, before: DeviceScene | None) -> None:
+        """Upload the meshes that ``before`` does not have, and place all objects."""
+        layout = self.scene.layout
+        known = {} if before is None else {mesh.mesh.key: mesh for mesh in before.meshes}
+        for mesh in layout.meshes:
             if mesh.key not in known:
                 known[mesh.key] = DeviceMesh(mesh, self.device)
-        return [known[source.geometry.key] for source in self.scene.objects]
+        meshes = [known[mesh.key] for mesh in layout.meshes]
+        numbers = {mesh: number for number, mesh in enumerate(dict.fromkeys(meshes))}
+        self.meshes: list[DeviceMesh] = list(numbers)
+        """Each mesh once: those with equal content are one."""
+        self.mesh_of: np.ndarray = np.array([numbers[mesh] for mesh in meshes], np.int64)[layout.mesh_of]
+        """(objects,) int64, the number of each object's mesh."""
+        counts = np.array([(len(mesh.faces), len(mesh.vertices)) for mesh in self.meshes], np.int64).reshape(-1, 2)
+        self._firsts = _numbered(counts[self.mesh_of])
+        """(objects + 1, 2) the numbers of each object's triangle 0 and vertex 0 among all objects'; then the totals."""
+        every = np.arange(len(self.mesh_of))
+        self.world_from_unit, self.spheres, self._host_records = self._placed(every)
+        """(objects, 4, 4) float64; (objects, 4) float64, centre and radius of each bounding sphere in device space;
+        (objects,) ``records`` on the host."""
+        self._stamps = np.full(len(every), next(_STAMPS))
+        """(objects,) int64: equal in two scenes, one of which comes from the other, if the object has not moved."""
+        if before is not None:  # an object was deformed
+            stands = ~self._changed_since(before)
+            self._stamps[stands] = before._stamps[stands]
+        self.records = wp.array(self._host_records, dtype=ObjectRecord, device=self.device, copy=False)
 
-    def _placed_objects(self, meshes: list[DeviceMesh], before: DeviceScene | None) -> list[DeviceObject]:
-        """The objects in device space. Those that stand where they stood in ``before`` are taken over: device space is
-        the same."""
-        former = [] if before is None else before.objects
-        placed: list[DeviceObject] = []
-        first_triangle = first_vertex = 0
-        for index, (source, geometry) in enumerate(zip(self.scene.objects, meshes, strict=True)):
-            if former and former[index].source is source:
-                placed.append(former[index])
-            else:
-                record, matrix = ObjectRecord(), world_from_unit(source, geometry.mesh)
-                set_geometry(record, geometry, self.device_from_world @ matrix, first_triangle, first_vertex)
-                set_material(record, source, geometry, self._decoded, skip_attributes=self._skip_attributes)
-                placed.append(DeviceObject(index, source, geometry, matrix, record))
-            first_triangle += len(geometry.mesh.faces)
-            first_vertex += len(geometry.mesh.vertices)
-        return placed
+    def _take_over(self, before: DeviceScene) -> None:
+        """Take over all objects but those that have changed. Device space and the meshes are the same."""
+        self.meshes, self.mesh_of, self._firsts = before.meshes, before.mesh_of, before._firsts
+        changed = np.flatnonzero(self._changed_since(before))
+        self.world_from_unit, self.spheres = before.world_from_unit.copy(), before.spheres.copy()
+        self._host_records, self._stamps = before._host_records.copy(), before._stamps.copy()
+        placed = self._placed(changed)
+        for values, own in zip(placed, (self.world_from_unit, self.spheres, self._host_records), strict=True):
+            own[changed] = values
+        self._stamps[changed] = next(_STAMPS)
+        self.records = wp.array(self._host_records, dtype=ObjectRecord, device=self.device, copy=False)
+
+    def _changed_since(self, before: DeviceScene) -> np.ndarray:
+        """(objects,) bool: which objects are others than in the scene that this one comes from."""
+        pairs = zip(self.scene.objects, before.scene.objects, strict=True)
+        return np.fromiter(itertools.starmap(operator.is_not, pairs), bool, len(self.scene.objects))
+
+    def _placed(self, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """``world_from_unit``, ``spheres`` and ``_host_records`` of the objects of these numbers."""
+        sources, mesh_of = [self.scene.objects[number] for number in numbers], self.mesh_of[numbers]
+        frames = np.array([_object_from_unit(mesh) for mesh in self.meshes]).reshape(-1, 4, 4)
+        world_from_unit = self.scene.layout.world_from_object[numbers] @ frames[mesh_of]
+        device_from_unit = self.device_from_world @ world_from_unit
+        radii = bounding_radii(self.meshes, mesh_of, device_from_unit)
+        records = object_records(sources, self.meshes, mesh_of, self._decoded, skip_attributes=self._skip_attributes)
+        set_places(records, device_from_unit, radii, *self._firsts[numbers].T)
+        return world_from_unit, np.concatenate([device_from_unit[:, :3, 3], radii[:, None]], axis=1), records
+
+    @functools.cached_property
+    def objects(self) -> DeviceObjects:
+        """The objects as the host sees them."""
+        return DeviceObjects(self.scene.objects, self.meshes, self.mesh_of, self.world_from_unit, self.spheres)
+
+    @property
+    def triangle_counts(self) -> np.ndarray:
+        """(objects,) int64 triangles of each object."""
+        return np.diff(self._firsts[:, 0])
+
+    @property
+    def vertex_counts(self) -> np.ndarray:
+        """(objects,) int64 vertices of each object."""
+        return np.diff(self._firsts[:, 1])
 
     @functools.cached_property
     def attribute_bytes(self) -> int:
         """Bytes of the normals and texture coordinates on the device."""
-        return sum(mesh.attribute_bytes for mesh in {entry.geometry for entry in self.objects})
+        return sum(mesh.attribute_bytes for mesh in self.meshes)
 
     @property
     def device_units_per_world_unit(self) -> float:
         """How long a world unit is in device space."""
         return float(self.device_from_world[0, 0])
 
+    @functools.cached_property
+    def is_reflector(self) -> np.ndarray:
+        """(objects,) bool."""
+        return self._host_records["mirror"].max(axis=1, initial=0.0) > 0.0
+
     @property
     def reflectors(self) -> list[DeviceObject]:
         """The objects that mirror."""
-        return [entry for entry in self.objects if entry.source.is_reflector]
+        return [self.objects[number] for number in np.flatnonzero(self.is_reflector).tolist()]
 
     @functools.cached_property
     def reflector_rows(self) -> tuple[wp.array, int]:
         """((objects,) int32, the number of a reflector's triangle 0 among all reflectors' triangles; their count)."""
-        counts = [len(entry.geometry.faces) if entry.source.is_reflector else 0 for entry in self.objects]
-        firsts = np.cumsum([0, *counts])
+        firsts = np.concatenate([[0], np.cumsum(np.where(self.is_reflector, self.triangle_counts, 0))])
         return wp.array(firsts[:-1].astype(np.int32), dtype=wp.int32, device=self.device), int(firsts[-1])
 
     @functools.cached_property
     def top_level(self) -> TopLevel:
         """The tree over all objects, in the order in which they stood when the scene was laid out."""
-        centres = np.array([entry.record.centre for entry in self.objects], np.float64).reshape(-1, 3)
-        radii = np.array([entry.record.radius for entry in self.objects], np.float32)
+        centres, radii = self.spheres[:, :3], self.spheres[:, 3]
         if self._top_order is None:
             self._top_order = order_of(centres)
         return top_level(centres, radii, self._top_order, self.device)
 
     def moved_since(self, before: DeviceScene) -> frozenset[int]:
         """Numbers of the objects that have moved since a scene that this one comes from."""
-        return frozenset(now.index for now, then in zip(self.objects, before.objects, strict=True) if now is not then)
+        return frozenset(np.flatnonzero(self._stamps != before._stamps).tolist())
 
     def look_from(self, camera: Camera) -> None:
         """Turn the environment to the camera's ``up``. The owner of the scene does so before every frame, and makes one
@@ -129,17 +181,26 @@ class DeviceScene:
         self.lighting.up = wp.vec3(*unit_up(camera))
 
 
-def _counted_vertices(meshes: list[DeviceMesh]) -> int:
-    """Vertices of all objects, given the mesh of each.
+_STAMPS = itertools.count()
+"""Numbers for whoever places objects, each used once."""
+
+
+def _object_from_unit(geometry: DeviceMesh) -> np.ndarray:
+    """(4, 4) float64: a mesh's own coordinates from its unit space."""
+    centre, half = geometry.mesh.unit_frame
+    matrix = np.diag([half, half, half, 1.0])
+    matrix[:3, 3] = centre
+    return matrix
+
+
+def _numbered(counts: np.ndarray) -> np.ndarray:
+    """(objects + 1, 2) int64: for each object the sum of the (objects, 2) counts before it; then the totals.
 
     Raises:
-        InputError: they, or the triangles, are more than can be numbered.
+        InputError: the triangles, or the vertices, are more than can be numbered.
     """
-    triangles = vertices = 0
-    for entry in meshes:
-        triangles += len(entry.mesh.faces)
-        vertices += len(entry.mesh.vertices)
-        for count, what in ((triangles, "triangles"), (vertices, "vertices")):
-            if count > MOST_NUMBERS:
-                raise InputError(f"the objects have more than {MOST_NUMBERS} {what}, instances counted in")
-    return vertices
+    firsts = np.concatenate([np.zeros((1, 2), np.int64), np.cumsum(counts, axis=0)])
+    for total, what in zip(firsts[-1].tolist(), ("triangles", "vertices"), strict=True):
+        if total > MOST_NUMBERS:
+            raise InputError(f"the objects have more than {MOST_NUMBERS} {what}, instances counted in")
+    return firsts

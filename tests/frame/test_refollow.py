@@ -35,10 +35,10 @@ def values(followed: FollowedRays) -> dict[str, np.ndarray]:
 
 def meets_box(followed: FollowedRays, scene: DeviceScene) -> np.ndarray:
     """(n,) whether rays meet the bounding sphere of the box, in float64."""
-    record = scene.objects[flat_mirror.BOX].record
-    offset = np.array(record.centre, float) - followed.rays.origin.numpy()
+    box = scene.objects[flat_mirror.BOX]
+    offset = box.centre - followed.rays.origin.numpy()
     along = (offset * followed.rays.direction.numpy()).sum(axis=1)
-    return (along > 0) & ((offset**2).sum(axis=1) - along**2 <= float(record.radius) ** 2)
+    return (along > 0) & ((offset**2).sum(axis=1) - along**2 <= box.radius**2)
 
 
 def test_only_runs_that_can_meet_what_moved_are_followed_again() -> None:

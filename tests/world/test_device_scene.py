@@ -48,10 +48,11 @@ def test_equal_meshes_and_textures_share_what_is_on_the_device(tmp_path: Path) -
     assert first.texture is not second.texture
     on_device = DeviceScene(scene, launch.resolve_device(None))
     assert on_device.objects[1].geometry is on_device.objects[2].geometry is not on_device.objects[0].geometry
-    records = [entry.record for entry in on_device.objects[1:]]
+    records = on_device.records.numpy()[1:]
     for name in ("vertices", "faces", "normals", "uvs", "texels", "texel_bytes", "part_texture"):
-        assert getattr(records[0], name).ptr == getattr(records[1], name).ptr, name
-    assert [record.first_triangle for record in records] == [len(MIRROR.geometry.faces), len(MIRROR.geometry.faces) + 1]
+        assert records[name]["data"][0] == records[name]["data"][1], name
+    triangles = len(MIRROR.geometry.faces)
+    assert records["first_triangle"].tolist() == [triangles, triangles + 1]
 
 
 def test_equal_meshes_share_maps_and_trees(tmp_path: Path) -> None:
@@ -70,8 +71,11 @@ def test_a_mesh_with_other_normals_or_texture_is_another(tmp_path: Path) -> None
     assert turned.key != sphere.key and turned.surface_key == sphere.surface_key
     objects = tuple(Object(mesh=mesh) for mesh in (sphere, turned))
     on_device = DeviceScene(Scene(camera=CAMERA, objects=objects), launch.resolve_device(None))
-    np.testing.assert_array_equal(on_device.objects[1].record.normals.numpy(), -sphere.normals)
-    np.testing.assert_array_equal(on_device.objects[0].record.normals.numpy(), sphere.normals)
+    first, second = on_device.objects
+    np.testing.assert_array_equal(second.geometry.normals.numpy(), -sphere.normals)
+    np.testing.assert_array_equal(first.geometry.normals.numpy(), sphere.normals)
+    pointers = on_device.records.numpy()["normals"]["data"].tolist()
+    assert pointers == [first.geometry.normals.ptr, second.geometry.normals.ptr]
 
 
 def test_a_moved_object_is_not_hashed_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -100,3 +104,35 @@ def test_a_copied_file_is_the_same_mesh(tmp_path: Path) -> None:
     first = ldtrefl.load_mesh(write_mesh(tmp_path / "a.obj"))
     shutil.copy(tmp_path / "a.obj", tmp_path / "b.obj")
     assert ldtrefl.load_mesh(tmp_path / "b.obj").key == first.key
+
+
+def test_what_an_object_leaves_as_it_was_is_taken_over(tmp_path: Path) -> None:
+    """The records of a moved scene are those of the same scene anew, and those of the scene before stay."""
+    scene, cpu = twins(tmp_path), launch.resolve_device(None)
+    before = DeviceScene(scene, cpu)
+    kept = before.records.numpy().copy()
+    changes = {"translate": (0.5, 1.0, 0.0), "material": Material(mirror=0.5, emission=1.0), "smooth": False}
+    moved = scene.with_object("1", **changes)
+    after, anew = DeviceScene(moved, cpu, before), DeviceScene(moved, cpu)
+    for name in set(kept.dtype.names or ()) - {"normals", "uvs", "vertices", "faces", "texels", "texel_bytes"}:
+        if kept.dtype[name].names is None:
+            np.testing.assert_array_equal(after.records.numpy()[name], anew.records.numpy()[name], err_msg=name)
+    np.testing.assert_array_equal(after.spheres, anew.spheres)
+    np.testing.assert_array_equal(after.world_from_unit, anew.world_from_unit)
+    assert after.meshes is before.meshes and after.moved_since(before) == {2}
+    assert after.is_reflector.tolist() == [True, False, True]
+    assert before.is_reflector.tolist() == [True, False, False]
+    assert (before.records.numpy() == kept).all() and not (after.records.numpy() == kept).all()
+
+
+def test_an_object_with_another_mesh_moves_the_numbers_of_those_after_it() -> None:
+    objects = (Object(name="a", shape="box"), Object(name="b", shape="box", translate=(3, 0, 0)))
+    scene, cpu = Scene(camera=CAMERA, objects=objects), launch.resolve_device(None)
+    changed = scene.with_object("a", shape="plane")
+    after = DeviceScene(changed, cpu, DeviceScene(scene, cpu))
+    assert after.records.numpy()["first_triangle"].tolist() == [0, 2]
+
+
+def test_no_objects() -> None:
+    empty = DeviceScene(Scene(camera=CAMERA), launch.resolve_device(None))
+    assert len(empty.objects) == 0 and empty.records.shape == (0,) and empty.reflectors == []

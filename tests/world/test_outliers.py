@@ -61,7 +61,7 @@ def test_more_triangles_than_an_int32_numbers_are_refused(monkeypatch: pytest.Mo
     camera = ldtrefl.Camera(eye=(0, -5, 0), look_at=(0, 0, 0), width=4, height=4)
     boxes = tuple(ldtrefl.Object(shape="box") for _ in range(9))
     ldtrefl.render(ldtrefl.Scene(camera=camera, objects=boxes[:4]))
-    with pytest.raises(ldtrefl.InputError, match="the objects have more than 100 vertices, instances counted in"):
+    with pytest.raises(ldtrefl.InputError, match="the objects have more than 100 triangles, instances counted in"):
         ldtrefl.render(ldtrefl.Scene(camera=camera, objects=boxes))
 
 

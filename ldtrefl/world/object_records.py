@@ -1,0 +1,137 @@
+"""The records of objects that kernels read, filled for many objects at once.
+
+What objects share, a mesh's arrays and its colours, is written once and copied. The rest is computed for all objects
+together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import chain
+from operator import attrgetter
+
+import numpy as np
+import warp as wp
+
+from ldtrefl.files.stored_picture import StoredPicture
+from ldtrefl.scene.description import Material, Object
+from ldtrefl.world.device_mesh import DeviceMesh
+from ldtrefl.world.records import ObjectRecord
+
+MOST_DOUBLINGS = 120
+"""Largest exponent, up or down, of the power of two ``unit_per_device``: float32 reaches from 2^-126 to 2^127."""
+
+
+def object_records(
+    sources: Sequence[Object],
+    meshes: Sequence[DeviceMesh],
+    mesh_of: np.ndarray,
+    decoded: wp.array,
+    *,
+    skip_attributes: bool,
+) -> np.ndarray:
+    """(n,) records of n objects, as numpy holds a ``wp.array`` of ``ObjectRecord``; their places are left at zero.
+
+    Args:
+        sources: the objects.
+        meshes: some meshes.
+        mesh_of: (n,) the number of each object's mesh.
+        decoded: (256,) float32, the linear value of every byte.
+        skip_attributes: leave out normals and texture coordinates that shading does not read.
+    """
+    materials = [source.material for source in sources]
+    albedo, mirror, emission = (_colors(materials, name) for name in ("albedo", "mirror", "emission"))
+    # An object that only glows needs no normals.
+    is_lit = np.maximum(albedo, mirror).max(axis=1, initial=0.0) > 0.0
+    smooth = np.array([source.smooth for source in sources], bool) & is_lit
+    needs_normals = smooth if skip_attributes else np.ones_like(smooth)
+    pictures, picture_of = _pictures(materials)
+    # Objects of one kind share all that is not their own.
+    kinds, kind_of = np.unique((mesh_of * len(pictures) + picture_of) * 2 + needs_normals, return_inverse=True)
+    shared = []
+    for kind in kinds.tolist():
+        mesh, picture = divmod(kind // 2, len(pictures))
+        uses = {"needs_normals": bool(kind % 2), "skip_attributes": skip_attributes}
+        shared.append(_shared_record(meshes[mesh], pictures[picture], decoded, **uses))
+    made = _copies(shared, kind_of)
+    made["smooth"], made["fresnel"] = smooth, [material.fresnel for material in materials]
+    made["albedo"], made["mirror"], made["emission"] = albedo, mirror, emission
+    made["returns"] = _sides_with_returns(meshes, mesh_of, mirror.max(axis=1, initial=0.0) > 0.0)
+    return made
+
+
+def set_places(
+    records: np.ndarray,
+    device_from_unit: np.ndarray,
+    radii: np.ndarray,
+    first_triangle: np.ndarray,
+    first_vertex: np.ndarray,
+) -> None:
+    """Fill in where objects stand.
+
+    Args:
+        records: (n,) the records that are filled in.
+        device_from_unit: (n, 4, 4) float64.
+        radii: (n,) of the bounding spheres, which are about the centres of the meshes' boxes.
+        first_triangle: (n,) number of each object's triangle 0 among all objects' triangles.
+        first_vertex: (n,) number of its vertex 0 among all objects' vertices.
+    """
+    inverse = np.linalg.inv(device_from_unit)
+    linear = inverse[:, :3, :3]
+    largest = np.abs(linear).max(axis=(1, 2), initial=0.0)
+    exponents = np.frexp(largest)[1].clip(-MOST_DOUBLINGS, MOST_DOUBLINGS)
+    records["device_from_unit"], records["unit_from_device"] = device_from_unit, inverse
+    records["unit_per_device"] = np.ldexp(1.0, exponents)
+    records["unit_from_direction"] = np.ldexp(linear, -exponents[:, None, None])
+    records["normal_from_unit"] = linear.transpose(0, 2, 1) / largest[:, None, None]
+    records["centre"], records["radius"] = device_from_unit[:, :3, 3], radii
+    records["first_triangle"], records["first_vertex"] = first_triangle, first_vertex
+
+
+def _colors(materials: Sequence[Material], name: str) -> np.ndarray:
+    """(n, 3) float64 of the materials' colours of this name."""
+    return np.fromiter(chain.from_iterable(map(attrgetter(name), materials)), float, 3 * len(materials)).reshape(-1, 3)
+
+
+def _sides_with_returns(meshes: Sequence[DeviceMesh], mesh_of: np.ndarray, is_reflector: np.ndarray) -> np.ndarray:
+    """(n,) from which sides rays can come back to each object; 0 where none leave it, because it does not mirror."""
+    of_mesh = np.zeros(len(meshes), np.int64)
+    for number in np.unique(mesh_of[is_reflector]).tolist():
+        of_mesh[number] = meshes[number].mesh.sides_with_returns
+    return np.where(is_reflector, of_mesh[mesh_of], 0)
+
+
+def _pictures(materials: Sequence[Material]) -> tuple[list[StoredPicture | None], np.ndarray]:
+    """The materials' textures, each once, None the first; (n,) the number of each material's."""
+    numbers: dict[str | None, int] = {None: 0}
+    pictures: list[StoredPicture | None] = [None]
+    picture_of = np.zeros(len(materials), np.int64)
+    for index, material in enumerate(materials):
+        picture = None if material.texture is None else material.picture
+        if picture is not None:
+            if picture.key not in numbers:
+                numbers[picture.key] = len(pictures)
+                pictures.append(picture)
+            picture_of[index] = numbers[picture.key]
+    return pictures, picture_of
+
+
+def _shared_record(
+    mesh: DeviceMesh, texture: StoredPicture | None, decoded: wp.array, *, needs_normals: bool, skip_attributes: bool
+) -> ObjectRecord:
+    """A record of a mesh's arrays and colours, and of the vertex attributes that shading reads."""
+    record, look = ObjectRecord(), mesh.appearance(texture)
+    record.vertices, record.faces, record.exact_vertices = mesh.vertices, mesh.faces, mesh.exact_vertices
+    record.normals = mesh.normals if needs_normals else mesh.no_normals
+    record.uvs = mesh.uvs if look.has_textures or not skip_attributes else mesh.no_uvs
+    record.part_first, record.part_color = look.part_first, look.part_color
+    record.part_texture, record.texels, record.texel_bytes = look.part_texture, look.texels, look.texel_bytes
+    record.decoded = decoded
+    return record
+
+
+def _copies(records: list[ObjectRecord], numbers: np.ndarray) -> np.ndarray:
+    """(n,) copies of the records of these (n,) numbers, as a structured array."""
+    one_each = wp.array(records, dtype=ObjectRecord, device="cpu").numpy()
+    # As plain bytes they are copied in one go, not field by field.
+    return one_each.view(f"V{one_each.dtype.itemsize}")[numbers].view(one_each.dtype)
