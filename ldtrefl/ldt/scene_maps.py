@@ -9,15 +9,17 @@ further bounce makes larger.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
+
+import numpy as np
 
 from ldtrefl.device.stats import Stats
 from ldtrefl.ldt.options import DEFAULT_RESOLUTION, LinearSteps, Quality
 from ldtrefl.ldt.peel import peel_mesh
 from ldtrefl.ldt.searches import TRACERS
 from ldtrefl.ldt.texture import LayeredDepthTexture
-from ldtrefl.tracing.tracer import BoundTracer, array_of_views
+from ldtrefl.tracing.tracer import BoundTracer, array_of_shared_views
 from ldtrefl.world.device_mesh import DeviceMesh
 from ldtrefl.world.device_scene import DeviceScene
 
@@ -73,33 +75,32 @@ class SceneMaps:
         """The resolution of maps that nothing is chosen for."""
         return self.options.resolution or DEFAULT_RESOLUTION
 
-    def bound(self, scene: DeviceScene, objects: set[int], stats: Stats) -> BoundTracer:
+    def bound(self, scene: DeviceScene, objects: Collection[int], stats: Stats) -> BoundTracer:
         """The tracer, once the maps of these objects are peeled at the resolutions chosen."""
         maps, mirrors = self._maps, _mirrors(scene)
         with stats.stage("peel", scene.device):
-            for mesh in dict.fromkeys(scene.objects[index].geometry for index in sorted(objects)):
+            for mesh in _meshes_of(scene, objects):
                 key = self._key(mesh, mesh in mirrors)
                 if key not in maps:
                     maps[key] = self._peeled(key, stats)
                 maps[key] = maps.pop(key)  # used last
             # Whatever was peeled for other frames has no part in this one.
-            meshes = _meshes(scene)
+            meshes = set(scene.meshes)
             for key in [key for key in maps if key.mesh not in meshes]:
                 del maps[key]  # of a mesh that has been deformed since
-            current = {mesh: maps.get(self._key(mesh, mesh in mirrors)) for mesh in meshes}
+            current = {mesh: maps.get(self._key(mesh, mesh in mirrors)) for mesh in scene.meshes}
             if self._bound is None or self._bound.maps != current:
                 self._bound = self._bind(scene, current)
         return self._bound.tracer
 
-    def has_usual_maps(self, scene: DeviceScene, objects: set[int]) -> bool:
+    def has_usual_maps(self, scene: DeviceScene, objects: Collection[int]) -> bool:
         """Whether the maps of these objects are made, at the usual resolution."""
         mirrors = _mirrors(scene)
-        meshes = {scene.objects[index].geometry for index in objects}
-        return all(self._usual_key(mesh, mesh in mirrors) in self._maps for mesh in meshes)
+        return all(self._usual_key(mesh, mesh in mirrors) in self._maps for mesh in _meshes_of(scene, objects))
 
     def meshes_without_maps(self, scene: DeviceScene) -> int:
         """Meshes that nothing has been peeled of."""
-        return len(_meshes(scene).keys() - {key.mesh for key in self._maps})
+        return len(set(scene.meshes) - {key.mesh for key in self._maps})
 
     def drop_old_maps(self) -> None:
         """Of each mesh keep the maps at the ``RESOLUTIONS_KEPT`` that were used last."""
@@ -134,21 +135,22 @@ class SceneMaps:
 
     def _bind(self, scene: DeviceScene, current: dict[DeviceMesh, LayeredDepthTexture | None]) -> _Bound:
         options, tracer = self.options, TRACERS[self.options.search]
-        of_mesh = {
-            mesh: tracer.view()
+        of_meshes = [
+            tracer.view()
             if maps is None
             else maps.view(options.search, linear_steps=options.linear_steps, binary_steps=options.binary_steps)
-            for mesh, maps in current.items()
-        }
-        views = array_of_views([of_mesh[entry.geometry] for entry in scene.objects], tracer.view, scene.device)
-        return _Bound(current, BoundTracer(tracer, views, list(of_mesh.values())))
+            for maps in current.values()
+        ]
+        views = array_of_shared_views(of_meshes, scene.mesh_of, tracer.view, scene.device)
+        return _Bound(current, BoundTracer(tracer, views, of_meshes))
 
 
 def _mirrors(scene: DeviceScene) -> set[DeviceMesh]:
     """The meshes of all reflectors."""
-    return {entry.geometry for entry in scene.reflectors}
+    return {scene.meshes[number] for number in np.unique(scene.mesh_of[scene.is_reflector]).tolist()}
 
 
-def _meshes(scene: DeviceScene) -> dict[DeviceMesh, None]:
-    """Every mesh once."""
-    return dict.fromkeys(entry.geometry for entry in scene.objects)
+def _meshes_of(scene: DeviceScene, objects: Collection[int]) -> list[DeviceMesh]:
+    """The meshes of these objects, each once, in the scene's order."""
+    numbers = scene.mesh_of[np.fromiter(objects, np.int64, len(objects))]
+    return [scene.meshes[number] for number in np.unique(numbers)]

@@ -44,4 +44,4 @@ def shadow_tracer(tracer: SceneTracer, scene: DeviceScene, stats: Stats) -> Boun
     """The tracer that answers a scene's shadow rays: ``tracer``, or one that meets nothing if there are no shadows."""
     if not scene.lighting.shadows:
         return no_shadows(scene.device)
-    return tracer.bound(scene, {entry.index for entry in scene.objects}, stats)
+    return tracer.bound(scene, range(len(scene.objects)), stats)

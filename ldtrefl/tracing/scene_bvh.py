@@ -5,9 +5,11 @@ They answer the rays of ray casting, and the shadow rays of every method that ha
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 from ldtrefl.device.stats import Stats
 from ldtrefl.tracing.bvh import BVH, BvhView, Raycaster
-from ldtrefl.tracing.tracer import BoundTracer, array_of_views
+from ldtrefl.tracing.tracer import BoundTracer, array_of_shared_views
 from ldtrefl.world.device_mesh import DeviceMesh
 from ldtrefl.world.device_scene import DeviceScene
 
@@ -22,16 +24,15 @@ class SceneBvh:
     def __init__(self) -> None:
         self._trees: dict[DeviceMesh, Raycaster] = {}
         self._meshes: list[DeviceMesh] = []
-        """Of each object, when the tracer was bound."""
+        """Of the scene, when the tracer was bound."""
         self._bound: BoundTracer | None = None
 
-    def bound(self, scene: DeviceScene, objects: set[int], stats: Stats) -> BoundTracer:
+    def bound(self, scene: DeviceScene, objects: Collection[int], stats: Stats) -> BoundTracer:
         """The tracer over all objects."""
-        meshes = [entry.geometry for entry in scene.objects]
-        if self._bound is None or self._meshes != meshes:
+        if self._bound is None or self._meshes != scene.meshes:
             with stats.stage("build", scene.device):
-                self._trees = {mesh: self._trees.get(mesh) or Raycaster.of(mesh) for mesh in dict.fromkeys(meshes)}
-                views = {mesh: tree.view() for mesh, tree in self._trees.items()}
-                listed = array_of_views([views[mesh] for mesh in meshes], BvhView, scene.device)
-                self._bound, self._meshes = BoundTracer(BVH, listed, list(self._trees.values())), meshes
+                self._trees = {mesh: self._trees.get(mesh) or Raycaster.of(mesh) for mesh in scene.meshes}
+                self._meshes, trees = list(scene.meshes), list(self._trees.values())
+                views = array_of_shared_views([tree.view() for tree in trees], scene.mesh_of, BvhView, scene.device)
+                self._bound = BoundTracer(BVH, views, trees)
         return self._bound

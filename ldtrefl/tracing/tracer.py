@@ -6,14 +6,16 @@ trace are built from a tracer, so everything above it (bounces, shadows, shading
 depth texture and for the BVH. A miss is ``t = +inf`` and triangle -1.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+import numpy as np
 import warp as wp
 
 from ldtrefl.device import warp_abi
 from ldtrefl.device.stats import Stats
+from ldtrefl.device.struct_copies import struct_copies
 from ldtrefl.world.device_scene import DeviceScene
 
 RAY_BLOCK = wp.constant(64)
@@ -71,13 +73,19 @@ class BoundTracer:
 class SceneTracer(Protocol):
     """A tracer for all objects of a scene: makes what it needs of a mesh when that is first needed, and keeps it."""
 
-    def bound(self, scene: DeviceScene, objects: set[int], stats: Stats) -> BoundTracer:
+    def bound(self, scene: DeviceScene, objects: Collection[int], stats: Stats) -> BoundTracer:
         """The tracer, ready for rays that can meet these objects, given by their numbers."""
 
 
 def array_of_views(views: Sequence[object], view: type, device: wp.Device) -> wp.array:
     """Views of objects as an array that kernels read. Whoever keeps the array keeps the views, too."""
     return warp_abi.array_of_structs(views, view, device)
+
+
+def array_of_shared_views(views: Sequence[object], numbers: np.ndarray, view: type, device: wp.Device) -> wp.array:
+    """The same for n objects that share views: ``numbers``, (n,), are those of each object's."""
+    one_each = array_of_views(views, view, wp.get_device("cpu")).numpy()
+    return wp.array(struct_copies(one_each, numbers), dtype=view, device=device, copy=False)
 
 
 def block_of(device: wp.Device) -> int:

@@ -13,6 +13,7 @@ from operator import attrgetter
 import numpy as np
 import warp as wp
 
+from ldtrefl.device.struct_copies import struct_copies
 from ldtrefl.files.stored_picture import StoredPicture
 from ldtrefl.scene.description import Material, Object
 from ldtrefl.world.device_mesh import DeviceMesh
@@ -53,7 +54,7 @@ def object_records(
         mesh, picture = divmod(kind // 2, len(pictures))
         uses = {"needs_normals": bool(kind % 2), "skip_attributes": skip_attributes}
         shared.append(_shared_record(meshes[mesh], pictures[picture], decoded, **uses))
-    made = _copies(shared, kind_of)
+    made = struct_copies(wp.array(shared, dtype=ObjectRecord, device="cpu").numpy(), kind_of)
     made["smooth"], made["fresnel"] = smooth, [material.fresnel for material in materials]
     made["albedo"], made["mirror"], made["emission"] = albedo, mirror, emission
     made["returns"] = _sides_with_returns(meshes, mesh_of, mirror.max(axis=1, initial=0.0) > 0.0)
@@ -128,10 +129,3 @@ def _shared_record(
     record.part_texture, record.texels, record.texel_bytes = look.part_texture, look.texels, look.texel_bytes
     record.decoded = decoded
     return record
-
-
-def _copies(records: list[ObjectRecord], numbers: np.ndarray) -> np.ndarray:
-    """(n,) copies of the records of these (n,) numbers, as a structured array."""
-    one_each = wp.array(records, dtype=ObjectRecord, device="cpu").numpy()
-    # As plain bytes they are copied in one go, not field by field.
-    return one_each.view(f"V{one_each.dtype.itemsize}")[numbers].view(one_each.dtype)

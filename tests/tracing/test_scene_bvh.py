@@ -9,6 +9,7 @@ from ldtrefl.scene.description import Camera, Material, Object, Scene
 from ldtrefl.tracing.bvh import BVH, Raycaster
 from ldtrefl.tracing.scene_bvh import SceneBvh
 from ldtrefl.world.device_mesh import DeviceMesh
+from ldtrefl.world.device_scene import DeviceScene
 from tests.tracing.boxes import scene_of
 
 
@@ -30,7 +31,8 @@ def test_every_mesh_has_one_tree_that_is_built_once(monkeypatch: pytest.MonkeyPa
     assert bvhs.bound(scene, {0, 1, 2}, Stats()) is tracer and len(built) == 1
     # Objects that move take their trees with them.
     again = Stats()
-    assert bvhs.bound(scene_of(np.eye(3) + 1.0), {0}, again) is tracer and again.seconds == {}
+    moved = DeviceScene(scene.scene.with_object(scene.scene.objects[1].name, translate=(5, 5, 5)), scene.device, scene)
+    assert bvhs.bound(moved, {0}, again) is tracer and again.seconds == {}
 
 
 def test_a_moved_object_keeps_its_tree() -> None:
