@@ -115,7 +115,10 @@ def test_nothing_of_earlier_frames_is_kept(cache: MapCache) -> None:
     """Maps, trees and meshes of the last frame alone; and what is made of a deformed mesh is not kept on disk."""
     fine = shapes.make("torus_knot", {"segments": [300, 20]})  # 12,000 triangles: enough for the disk
     given = scene()
-    given = Scene(camera=given.camera, objects=(*given.objects[:1], Object(name="knot", mesh=fine, scale=0.5, translate=(1.5, -1, 0))))
+    given = Scene(
+        camera=given.camera,
+        objects=(*given.objects[:1], Object(name="knot", mesh=fine, scale=0.5, translate=(1.5, -1, 0))),
+    )
     for method in ("ldt", "bvh"):
         renderer = ldtrefl.Renderer(given, method)
         renderer.render()
