@@ -3,9 +3,9 @@
 The test looks at the rays themselves, of any bounce. Rays come in runs that stand together on the screen
 (``tracing/object_sets.py``): the origins of a run lie in a ball, its directions in a cone. The scene's top level
 (``world/top_level.py``) is gone down for a run: what no ray of such a cone can meet is dropped for all of them at once,
-and an object that is left is listed with the rays of the run that do meet its bounding sphere. So nothing is lost,
-whatever the normals, and the cost follows the pixels and what they show, not the reflector's triangles nor the number
-of objects. The paper's own test is in ``flat_regions.py``.
+and an object that is left is listed with those rays of the run that meet its bounding sphere (``run_rays.py``). So
+nothing is lost, whatever the normals, and the cost follows the pixels and what they show, not the reflector's triangles
+nor the number of objects. The paper's own test is in ``flat_regions.py``.
 
 All in device space.
 """
@@ -21,13 +21,14 @@ from ldtrefl.device import launch
 from ldtrefl.device.stats import Stats
 from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.run_lists import RunLists, listed, set_entry, swap_entries
-from ldtrefl.geometry.sphere import meets_sphere, sphere_entry
+from ldtrefl.frame.run_rays import ROWS, lay_side_by_side, rays_near
+from ldtrefl.geometry.sphere import sphere_entry
 from ldtrefl.geometry.vectors import from_to
 from ldtrefl.tracing.closest_hits import GROUP
 from ldtrefl.tracing.object_sets import RUN, ObjectSets, all_sets, lowest_bit_of_64, run_count
 from ldtrefl.tracing.ray_buffers import RayBuffer
 from ldtrefl.world.device_scene import DeviceScene
-from ldtrefl.world.top_level import STACK, TopLevel, TopNode
+from ldtrefl.world.top_level import STACK, TopLevel
 
 FEW_OBJECTS = 8
 """Up to this many objects culling costs as much as it saves: 4% more time than without it
@@ -87,25 +88,17 @@ def may_meet(bounds: RunBounds, centre: wp.vec3d, radius: float) -> bool:
     return wp.dot(bounds.axis, towards) >= (least - COSINE_SLACK) * apart
 
 
-NARROW = wp.constant(0.9)
-"""Cosine of a cone's half-angle from which the cone alone tells which inner nodes are gone into. In wider ones each ray
-is tested: the cone of a run that is mirrored at a rim holds half of all objects, and its rays meet few."""
-
-
 @wp.func
-def rays_that_meet(rays: RayBuffer, begin: int, asked: wp.uint64, node: TopNode) -> wp.uint64:
-    """Those of the rays from ``begin`` on that are asked for, a bit each, that meet the sphere of a node. If it is an
-    object, rays that leave it and cannot come back to it do not count."""
-    met = wp.uint64(0)
-    left = asked
+def without_own(rays: RayBuffer, begin: int, met: wp.uint64, k: int) -> wp.uint64:
+    """The rays from ``begin`` on, a bit each, but for those that leave object ``k`` and cannot come back to it."""
+    others = met
+    left = met
     while left != wp.uint64(0):
         bit = lowest_bit_of_64(left)
         left = left & (left - wp.uint64(1))
-        i = begin + bit
-        is_own = node.count == 0 and rays.source[i] == node.first and rays.may_return[i] == wp.uint8(0)
-        if not is_own and meets_sphere(rays.origin[i], rays.direction[i], node.centre, node.radius):
-            met = met | (wp.uint64(1) << wp.uint64(bit))
-    return met
+        if rays.source[begin + bit] == k and rays.may_return[begin + bit] == wp.uint8(0):
+            others = others & ~(wp.uint64(1) << wp.uint64(bit))
+    return others
 
 
 @wp.func
@@ -151,6 +144,9 @@ def cull_runs(
     run = first + wp.tid()
     begin, end = RUN * run, wp.min(RUN * run + RUN, rays.source.shape[0])
     bounds = bounds_of_run(rays, begin, end)
+    row_memory = wp.zeros(shape=ROWS, dtype=wp.float32)
+    rows = wp.array(ptr=row_memory.ptr, shape=(ROWS,), dtype=wp.float32)
+    lay_side_by_side(rays, begin, end, bounds.middle, rows)
     nodes, masks = wp.zeros(shape=STACK, dtype=wp.int32), wp.zeros(shape=STACK, dtype=wp.uint64)
     nodes[0] = top.root
     masks[0] = rays_alive(rays, begin, end)
@@ -163,9 +159,9 @@ def cull_runs(
         for number in range(node.first, node.first + node.count):
             child = top.nodes[number]
             if may_meet(bounds, child.centre, child.radius):
-                met = asked
-                if child.count == 0 or bounds.cosine < NARROW:
-                    met = rays_that_meet(rays, begin, asked, child)
+                met = rays_near(rows, bounds.middle, bounds.reach, child.centre, child.radius, asked)
+                if child.count == 0:
+                    met = without_own(rays, begin, met, child.first)
                 if met != wp.uint64(0) and child.count > 0:
                     nodes[waiting] = number
                     masks[waiting] = met

@@ -13,6 +13,7 @@ from stress_cases.inputs import rays_about
 
 import ldtrefl
 from ldtrefl.device import cpu_threads, native_sources, warp_abi
+from ldtrefl.frame import run_rays
 from ldtrefl.ldt.exact import walk, wide_tree
 from ldtrefl.ldt.exact.tree import TreeView
 from ldtrefl.ldt.exact.walk import CONSTANTS, FILES, SEARCH, TREE
@@ -40,6 +41,7 @@ template <int N> struct launch_bounds_t { uint32_t shape[N]; size_t size, coord_
 SOURCES = {
     "device/cpu_threads.h": (cpu_threads.CONSTANTS, ()),
     "device/vectors.h": ({}, ()),
+    "frame/run_rays.h": (run_rays.CONSTANTS, ("device/vectors.h",)),
     "tracing/ray_batch.h": ({}, ("device/vectors.h",)),
     **{
         name: (module.CONSTANTS, module.FILES[:number])
