@@ -86,18 +86,21 @@ class LayeredDepthTexture:
     def sorted_maps(self) -> Maps:
         """The sorted maps that the linear search reads."""
         if self._maps is None:
-            self._maps = self._cached_or_made("maps", self._make_maps, self._read_maps)
+            self._maps = self._cached_or_made("maps", {}, self._make_maps, self._read_maps)
         return self._maps
 
     @property
     def tree(self) -> Tree:
         """The tree that the exact search goes down."""
         if self._tree is None:
-            self._tree = self._cached_or_made("tree", self._make_tree, self._read_tree)
+            choices = {"quality": self.quality, "trusted": self.trusted}
+            self._tree = self._cached_or_made("tree", choices, self._make_tree, self._read_tree)
         return self._tree
 
     def _make_maps(self) -> Maps:
-        return Maps.of(self.frame, self._counted_fragments().fragments())
+        made = Maps.of(self.frame, self._counted_fragments().fragments())
+        self._rasteriser = None  # it holds as much as the maps, and they count their fragments themselves
+        return made
 
     def _read_maps(self, entry: Entry) -> Maps:
         check_fragments(self.frame, len(self.geometry.faces), entry.arrays)
@@ -117,13 +120,22 @@ class LayeredDepthTexture:
             self._rasteriser = Rasteriser(self.geometry, self.frame)
         return self._rasteriser
 
-    def _cached_or_made(self, kind: str, make: Callable[[], Made], read: Callable[[Entry], Made]) -> Made:
-        """What the cache in use has, or else what is made now, and then kept there."""
+    def _cached_or_made(
+        self, kind: str, choices: Mapping[str, object], make: Callable[[], Made], read: Callable[[Entry], Made]
+    ) -> Made:
+        """What the cache in use has, or else what is made now, and then kept there.
+
+        Args:
+            kind: what is made of the mesh.
+            choices: what else it depends on, beside the resolution.
+            make: makes it.
+            read: makes it from what the cache has.
+        """
         cache, mesh = current_cache(), self.geometry.mesh
         if cache is None or mesh.is_deformed or len(mesh.faces) < WORTH_CACHING:
             return make()
-        options = {"kind": kind, "resolution": self.resolution, "quality": self.quality, "trusted": self.trusted}
-        key = key_of(mesh.surface_key, {**options, "algorithm": fingerprint("ldt.texture")})
+        options = {"kind": kind, "resolution": self.resolution, "algorithm": fingerprint("ldt.texture")}
+        key = key_of(mesh.surface_key, {**options, **choices})
         cached = cache.load_as(key, read)
         self.from_cache = cached is not None
         if cached is not None:

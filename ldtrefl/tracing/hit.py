@@ -14,7 +14,7 @@ class Hit:
     u: float  # barycentrics: weights of the triangle's second and third corner; -1 if it stands for many
     v: float
     normal: wp.vec3  # of the facet, unit, by the triangle's winding
-    steps: int  # texels or samples looked at
+    steps: int  # nodes, blocks or samples looked at
 
 
 @wp.func

@@ -110,7 +110,7 @@ FILES = (
 TREE = """
     auto& view = views.data[index];
     const TreeWalk::Tree tree = {view.nodes.data, view.rows.data, &view.low[0], &view.high[0], view.half_patch};
-    static_assert(sizeof(queries.data[0]) == sizeof(TreeWalk::Query), "a Query as trace.py has it");
+    static_assert(sizeof(queries.data[0]) == sizeof(TreeWalk::Query), "a Query as tracer.py has it");
     const TreeWalk::Query* asked = (const TreeWalk::Query*)queries.data;
     TreeWalk::Rays rays[TreeWalk::EIGHTS];
 """
