@@ -1,7 +1,7 @@
 """What a scene file says: camera, environment, lights and objects, their meshes and materials, and procedural shapes.
 
     description.py      the dataclasses of a scene; load.py reads them from a file, toml_text.py the TOML in it
-    placement.py        where an object stands
+    placement.py        where an object stands; places.py has one stand in many places
     mesh.py             a triangle mesh, checked; mesh_arrays.py goes over its arrays
     normals.py          vertex normals, with welding.py and two_sided.py
     outliers.py         the few triangles far outside a mesh's bulk

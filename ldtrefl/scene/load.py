@@ -7,6 +7,7 @@ that names the scene file, the key, what is wrong and what is allowed.
 from __future__ import annotations
 
 import dataclasses
+import functools
 import json
 import os
 import typing
@@ -14,12 +15,14 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
+import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
 from ldtrefl.base import budget
 from ldtrefl.base.errors import InputError, first_fault
 from ldtrefl.scene.description import Environment, Object, Scene
 from ldtrefl.scene.mesh import Mesh
+from ldtrefl.scene.places import split_places, standing_in
 from ldtrefl.scene.toml_text import read_toml
 
 MESH_PATH_VARIABLE = "LDTREFL_MESH_PATH"
@@ -55,29 +58,42 @@ def load_scene(path: str | Path) -> Scene:
     path = Path(path)
     tables = read_toml(path)
     try:
+        tables, places = split_places(tables)
         scene = _ADAPTER.validate_python(tables)
     except ValidationError as error:
-        raise first_fault(error, _allowed_keys(Scene)).within(str(path)) from None
+        allowed = _allowed_keys(Scene)
+        allowed["object"].append("places")
+        raise first_fault(error, allowed).within(str(path)) from None
     except InputError as error:
         raise error.within(str(path)) from None
     with budget.account():
-        return _found(scene, path)
+        return _found(scene, places, path)
 
 
-def _found(scene: Scene, path: Path) -> Scene:
-    """The scene with every file found and read; a fault names the key."""
-    count = len(scene.objects)
+def _found(scene: Scene, places: dict[int, np.ndarray], path: Path) -> Scene:
+    """The scene with every file found and read, and its objects in their ``places``; a fault names the key."""
+    count = len(scene.objects) - len(places) + sum(map(len, places.values()))
     _at(path, "object", lambda: budget.take(OBJECT_BYTES * count, f"a list of {count}"))
     # What several objects share is made once, and so is taken from the budget once.
     meshes: dict[tuple[str | None, str, str], Mesh] = {}
-    objects = [_found_object(entry, f"object[{index}]", path, meshes) for index, entry in enumerate(scene.objects)]
+    objects: dict[str, Object] = {}
+    for index, entry in enumerate(scene.objects):
+        key = f"object[{index}]"
+        found = _found_object(entry, key, path, meshes)
+        if index in places:
+            placed = _at(path, key, functools.partial(standing_in, found, places[index]))
+            objects |= {f"{key}: places[{number}]": copy for number, copy in enumerate(placed)}
+        else:
+            objects[key] = found
     environment = _found_environment(scene.environment, path)
-    found = dataclasses.replace(scene, objects=tuple(objects), environment=environment)
+    laid_out = dataclasses.replace(scene, objects=tuple(objects.values()), environment=environment)
     try:
-        found.layout  # noqa: B018  (it refuses sizes that are not allowed)
-    except InputError as error:
-        raise error.within(str(path)) from None
-    return found
+        laid_out.layout  # noqa: B018  (it refuses sizes that are not allowed)
+    except InputError:
+        for key, entry in objects.items():
+            _at(path, key, entry.world_from_object)
+        raise
+    return laid_out
 
 
 def _found_object(entry: Object, key: str, path: Path, meshes: dict[tuple[str | None, str, str], Mesh]) -> Object:

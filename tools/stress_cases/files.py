@@ -89,8 +89,8 @@ translate = [1.5, -1.5, 0.0]
 
 [[object]]
 shape = "plane"
-translate = [0.0, 0.0, -1.2]
 scale = 3.0
+places = [[0.0, 0.0, -1.2], [0.0, 0.0, -1.4, 1.5]]
 [object.material]
 albedo = [0.5, 0.5, 0.5]
 texture = "TEXTURE"
