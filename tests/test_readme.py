@@ -120,6 +120,7 @@ def test_tables_list_what_there_is() -> None:
     assert set(rows_of("docs/skips.md", "skip")) == set(skip_names())
     files = {path.stem for path in Path(command_files.__file__).parent.glob("*.py")} - {"__init__"}
     assert set(rows_of("docs/command_line.md", "command")) <= files
+    assert set(rows_of("docs/scenes.md", "scene")) <= {path.name for path in (ROOT / "scenes").glob("*.toml")}
 
 
 def test_the_table_of_shapes_has_their_parameters() -> None:

@@ -36,7 +36,7 @@ QUICK_SIZE = 192, 128
 def shipped() -> dict[str, Path]:
     """Name -> file of every shipped scene."""
     folder = ROOT / "scenes"
-    paths = [*sorted(folder.glob("*.toml")), *sorted((folder / "paper").glob("*.toml"))]
+    paths = [path for place in (".", "paper", "meshes") for path in sorted((folder / place).glob("*.toml"))]
     return {str(path.relative_to(folder).with_suffix("")): path for path in paths}
 
 
