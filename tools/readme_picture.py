@@ -1,9 +1,10 @@
-"""Renders the README's pictures: a scene by layered depth textures with the ray-traced truth inset, and peeled layers.
+"""Renders the README's pictures: a scene by layered depth textures with the ray-traced truth inset, mirrors that see
+themselves and one another, and peeled layers.
 
-    python tools/readme_picture.py             # a few seconds; writes docs/teapot.png and docs/layers.png
+    python tools/readme_picture.py             # half a minute; writes teapot.png, mirrors.png and layers.png into docs/
     python tools/readme_picture.py FOLDER      # the same into another folder
 
-The scene is ``scenes/teapot.toml``, and the layers are those of the shape ``genus3``.
+The scenes are those of ``scenes/``, and the layers those of the shape ``genus3``.
 """
 
 from __future__ import annotations
@@ -24,16 +25,26 @@ CROP = (slice(182, 342), slice(288, 528))
 FRAME = 3
 """Width of the inset's white frame, pixels."""
 
+MIRRORS = (
+    ("facing_balls", "linked_mirrors", "thousand_pearls"),
+    ("inside_bowl", "hall_of_mirrors", "mirror_room"),
+)
+"""Names of the scenes of mirrors in mirrors, as their pictures stand in rows."""
+
+GAP = 8
+"""Width of the white lines between those pictures, pixels."""
+
 MAP_RESOLUTION = 192
 """Texels along a side of the layers' picture: it shall not be larger than the README is wide."""
 
 
 def main() -> None:
-    """Write both pictures."""
+    """Write the pictures."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path, nargs="?", default=ROOT / "docs", help="where the pictures go")
     folder = parser.parse_args().folder
     ldtrefl.save_image(folder / "teapot.png", picture_with_inset())
+    ldtrefl.save_image(folder / "mirrors.png", picture_of_mirrors())
     shape = shapes.make("genus3")
     maps = ldtrefl.peel(shape.vertices, shape.faces, resolution=MAP_RESOLUTION)
     ldtrefl.save_image(folder / "layers.png", draw_layers(maps))
@@ -49,6 +60,31 @@ def picture_with_inset() -> np.ndarray:
     framed[FRAME:-FRAME, FRAME:-FRAME] = inset
     picture[: framed.shape[0], -framed.shape[1] :] = framed
     return picture
+
+
+def picture_of_mirrors() -> np.ndarray:
+    """(h, w, 3) float32: the scenes of ``MIRRORS`` at half their size, so that each pixel is the mean of four."""
+    rows = [_side_by_side([halved(rendered(name)) for name in names], axis=1) for names in MIRRORS]
+    return _side_by_side(rows, axis=0)
+
+
+def rendered(name: str) -> np.ndarray:
+    """(h, w, 3) float32: a shipped scene, as the screen shows it: what is brighter than white is white."""
+    return ldtrefl.render(ldtrefl.load_scene(ROOT / "scenes" / f"{name}.toml"), "ldt").image.clip(0.0, 1.0)
+
+
+def halved(picture: np.ndarray) -> np.ndarray:
+    """A picture of half the height and width, both even: the mean of every 2 x 2 pixels."""
+    height, width, channels = picture.shape
+    return picture.reshape(height // 2, 2, width // 2, 2, channels).mean(axis=(1, 3))
+
+
+def _side_by_side(pictures: list[np.ndarray], axis: int) -> np.ndarray:
+    """Pictures of one size along an axis, with white lines in between."""
+    shape = list(pictures[0].shape)
+    shape[axis] = GAP
+    parts = [part for picture in pictures for part in (np.ones(shape, np.float32), picture)]
+    return np.concatenate(parts[1:], axis=axis)
 
 
 if __name__ == "__main__":
