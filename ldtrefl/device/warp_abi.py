@@ -41,6 +41,73 @@ CALL_KERNEL = """
 """C++ for the body of a ``wp.func_native``."""
 
 
+READ_BVH = """
+    struct WarpBvh {
+        enum { DEPTH = BVH_QUERY_STACK_SIZE };  // nodes from the root to a leaf, at most
+
+        struct Node {
+            wp::BVHPackedNodeHalf low, high;  // sides of its box: x, y and z
+
+            CUDA_CALLABLE bool is_leaf() const { return low.b != 0; }
+            // Of a leaf the first of its ``items``, and the one after its last; of any other node its two children.
+            CUDA_CALLABLE int first() const { return (int)low.i; }
+            CUDA_CALLABLE int second() const { return (int)high.i; }
+        };
+
+        const wp::BVHPackedNodeHalf *lows, *highs;
+        const int* items;  // in the order of the leaves
+        int root;
+
+        static CUDA_CALLABLE WarpBvh of(uint64_t id) {
+            const wp::BVH& bvh = *(const wp::BVH*)id;
+            return {bvh.node_lowers, bvh.node_uppers, bvh.primitive_indices, *bvh.root};
+        }
+        CUDA_CALLABLE Node node(int number) const {
+            return {wp::bvh_load_node(lows, number), wp::bvh_load_node(highs, number)};
+        }
+    };
+"""
+"""C++ for the body of a ``wp.func_native``: the tree of a ``wp.Bvh``. Use it only if :func:`bvh_is_known`."""
+
+BVH_LAYOUT = (
+    """
+struct BVHPackedNodeHalf {
+    float x;
+    float y;
+    float z;
+    // For non-leaf nodes:
+    // - 'lower.i' represents the index of the left child node.
+    // - 'upper.i' represents the index of the right child node.
+    //
+    // For leaf nodes:
+    // - 'lower.i' indicates the start index of the primitives in 'primitive_indices'.
+    // - 'upper.i' indicates the index just after the last primitive in 'primitive_indices'
+    unsigned int i : 31;
+    unsigned int b : 1;
+};
+""",
+    "    BVHPackedNodeHalf* node_lowers;\n    BVHPackedNodeHalf* node_uppers;\n",
+    "    int* primitive_indices;\n",
+    "    int* root;\n",
+    "inline BVH bvh_get(uint64_t id) { return *(BVH*)(id); }\n",
+    "inline wp::BVHPackedNodeHalf bvh_load_node(const wp::BVHPackedNodeHalf* nodes, int index)",
+    "#define BVH_QUERY_STACK_SIZE (32)\n",
+)
+"""What Warp's header says of a ``wp.Bvh``, as ``READ_BVH`` has it."""
+
+BVH_HEADER = Path(wp.__file__).parent / "native" / "bvh.h"
+"""Warp's own, which kernels are compiled with."""
+
+
+def bvh_is_known(header: Path = BVH_HEADER) -> bool:
+    """Whether the nodes of a ``wp.Bvh`` are laid out as ``READ_BVH`` reads them. If not, its queries are the way."""
+    try:
+        text = header.read_text()
+    except (OSError, UnicodeError):
+        return False
+    return all(part in text for part in BVH_LAYOUT)
+
+
 def unknown_layout(command: wp.Launch, folders: Sequence[Path]) -> str | None:
     """What is unknown about how a recorded CPU launch is called; None if all is known. No native code is called.
 

@@ -8,7 +8,8 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from ldtrefl.device.stats import Stats
-from ldtrefl.tracing.bvh import BVH, BvhView, Raycaster
+from ldtrefl.tracing.bvh import BVH, Raycaster
+from ldtrefl.tracing.bvh_walk import BvhView
 from ldtrefl.tracing.tracer import BoundTracer, array_of_shared_views
 from ldtrefl.world.device_mesh import DeviceMesh
 from ldtrefl.world.device_scene import DeviceScene

@@ -19,6 +19,7 @@ from ldtrefl.ldt.exact.tree import TreeView
 from ldtrefl.ldt.exact.walk import CONSTANTS, FILES, SEARCH, TREE
 from ldtrefl.ldt.linear import march
 from ldtrefl.scene import shapes
+from ldtrefl.tracing import bvh_walk
 from ldtrefl.tracing.batch import trace_batch
 from ldtrefl.tracing.hit import Hit
 from ldtrefl.tracing.tracer import Query, array_of_views
@@ -30,19 +31,26 @@ SHIM = (
 #include <cstdint>
 #include <cstring>
 #define CUDA_CALLABLE
+#define BVH_QUERY_STACK_SIZE (32)
 namespace wp {
 template <int N> struct launch_bounds_t { uint32_t shape[N]; size_t size, coord_mult; };
+struct BVHPackedNodeHalf { float x, y, z; unsigned int i : 31; unsigned int b : 1; };
+struct BVH { BVHPackedNodeHalf *node_lowers, *node_uppers; int *primitive_indices, *root; };
+inline BVHPackedNodeHalf bvh_load_node(const BVHPackedNodeHalf* nodes, int index) { return nodes[index]; }
 }
 """
     + warp_abi.CALL_KERNEL
+    + warp_abi.READ_BVH
 )
-"""What Warp's headers give native functions, and what ``warp_abi.py`` puts before the threads'."""
+"""What Warp's headers give native functions, and what ``warp_abi.py`` puts before the threads' and the ray caster's."""
 
 SOURCES = {
     "device/cpu_threads.h": (cpu_threads.CONSTANTS, ()),
     "device/vectors.h": ({}, ()),
     "frame/run_rays.h": (run_rays.CONSTANTS, ("device/vectors.h",)),
     "tracing/ray_batch.h": ({}, ("device/vectors.h",)),
+    "tracing/triangle_test.h": ({}, ("device/vectors.h",)),
+    "tracing/bvh_walk.h": (bvh_walk.CONSTANTS, bvh_walk.FILES[:-1]),
     **{
         name: (module.CONSTANTS, module.FILES[:number])
         for module in (march, wide_tree, walk)

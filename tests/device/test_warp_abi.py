@@ -53,6 +53,18 @@ def test_unknown_layouts_are_not_called(tmp_path: Path) -> None:
     assert warp_abi.unknown_layout(command, [tmp_path / "none"])
 
 
+def test_other_trees_than_are_known_are_not_read(tmp_path: Path) -> None:
+    """Whatever is changed in what Warp's header says of its trees; a header that is not there, or no text."""
+    assert warp_abi.bvh_is_known()
+    header = tmp_path / "bvh.h"
+    for part in warp_abi.BVH_LAYOUT:
+        header.write_text(warp_abi.BVH_HEADER.read_text().replace(part, part.swapcase()))
+        assert not warp_abi.bvh_is_known(header), part
+    assert not warp_abi.bvh_is_known(tmp_path / "none")
+    header.write_bytes(b"\xff\xfe\xfa")
+    assert not warp_abi.bvh_is_known(header)
+
+
 def test_structs_without_their_memory() -> None:
     device = launch.resolve_device(None)
     structs = []

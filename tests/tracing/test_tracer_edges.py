@@ -15,7 +15,7 @@ TRACERS = ["exact", "bvh"]
 def test_nothing_slips_through_and_nothing_sticks_out(name: str, by: str) -> None:
     trace = dict(edges.tracers(edges.made()[name]))[by]
     for kind, given, right in rays_at(name):
-        outcome = edges.judge_edges(right, given, trace(*given), edges.held(by, kind))
+        outcome = edges.judge_edges(right, given, trace(*given))
         assert outcome.passed, f"{kind}: {outcome}"
 
 
@@ -23,5 +23,5 @@ def test_nothing_slips_through_and_nothing_sticks_out(name: str, by: str) -> Non
 def test_slim_triangles_are_met_and_named_like_others(by: str) -> None:
     trace = dict(edges.tracers(edges.made()[ROD]))[by]
     for kind, given, right in rays_at(ROD):
-        outcome = edges.judge_edges(right, given, trace(*given), edges.held(by, kind))
+        outcome = edges.judge_edges(right, given, trace(*given))
         assert outcome.passed, f"{kind}: {outcome}"

@@ -56,7 +56,7 @@ class Ours(RayTracer):
 
 
 class Caster(Ours):
-    """``Raycaster``: Warp's BVH."""
+    """``Raycaster``: our walk down Warp's BVH."""
 
     name = "bvh"
     tracer = BVH

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 
 import ldtrefl
@@ -29,12 +27,6 @@ AIMED_SHARE = 20.0
 AIMED = limits(
     Limit(wrong=AIMED_SHARE, p99=np.inf, why="a hit or a miss at a silhouette's vertex is chance"),
     linear=linear_limit(AIMED_SHARE, "aimed at silhouettes' corners, which are blocks of a texel"),
-)
-AIMED["bvh"] = dataclasses.replace(
-    AIMED["exact"],
-    defects=1.0,
-    p999=np.inf,
-    why="Warp's tree lets one in 300 rays that are aimed exactly at a vertex or an edge pass between two boxes",
 )
 """For rays aimed at vertices and edges as exactly as float32 can."""
 

@@ -50,11 +50,6 @@ FUZZ = Limit(
     place=3.0,
     why="any mesh, stretched up to 1:100, slim triangles met at grazing angles, from inside, outside and on it",
 )
-BVH = dataclasses.replace(
-    FUZZ,
-    defects=0.1,
-    why="Warp's tree finds triangles whose area is a rounding and planes seen edge on, and loses rays through vertices",
-)
 POOLED = {"exact": 2.0, "balanced": 2.0, "fast": 2.0, "linear": 50.0, "bvh": 1.0}
 """Percent of the rays of all examples together that may disagree, however well explained: a single example may consist
 of ties alone."""
@@ -188,8 +183,6 @@ def limit_of(by: str, mesh: ldtrefl.Mesh | None, resolution: int = TEXELS) -> Li
             wrong=60.0 if by == "fast" else 25.0,
             why="patches of maps from 16 texels",
         )
-    if by == "bvh":
-        return BVH
     return FUZZ
 
 
