@@ -32,5 +32,6 @@ def assert_as_fresh(renderer: ldtrefl.Renderer, frame: Frame, method: str = "ldt
     np.testing.assert_array_equal(frame.image, fresh.image)
     np.testing.assert_array_equal(frame.reflection, fresh.reflection)
     assert frame.hits is not None and fresh.hits is not None
-    for name in ("distance", "object", "triangle"):
-        np.testing.assert_array_equal(getattr(frame.hits, name), getattr(fresh.hits, name))
+    for mine, right in zip((frame.hits, *frame.hits.later), (fresh.hits, *fresh.hits.later), strict=True):
+        for name in ("distance", "object", "triangle", "followed"):
+            np.testing.assert_array_equal(getattr(mine, name), getattr(right, name))

@@ -115,6 +115,17 @@ def account() -> Iterator[Account]:
         _account.reset(token)
 
 
+@contextlib.contextmanager
+def given_back() -> Iterator[None]:
+    """Add up the memory that is asked for inside this block, and give it back at the block's end."""
+    with account() as current:
+        before = current.taken
+        try:
+            yield
+        finally:
+            current.taken = before
+
+
 def take(needed: float, what: str, smaller: str = "") -> None:
     """Ask for memory before it is allocated.
 

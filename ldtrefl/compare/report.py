@@ -1,7 +1,9 @@
-"""What a comparison with the true frame says: every metric, as a table and as ``compare.json``."""
+"""What a comparison with the true frame says: every metric and the errors of every bounce, as tables and as
+``compare.json``."""
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from rich.table import Table
 
+from ldtrefl.compare.bounces import BounceErrors, errors_by_bounce
 from ldtrefl.compare.metrics import all_metrics
 from ldtrefl.compare.metrics.base import Comparison
 from ldtrefl.files.atomic_write import written_whole
@@ -25,10 +28,12 @@ class Row:
     """Per stage of the frame."""
     errors: Mapping[str, float]
     """Metric -> value; metrics that need what the method lacks are left out."""
+    bounces: tuple[BounceErrors, ...] = ()
+    """Of the reflected rays; empty for methods without rays."""
 
 
 def compared(frame: Frame, truth: Frame, texel_sizes: np.ndarray, gbuffer: GBuffer | None) -> Row:
-    """Every metric of a frame.
+    """Every metric of a frame, and the errors of its bounces.
 
     Args:
         frame: the method's.
@@ -39,7 +44,10 @@ def compared(frame: Frame, truth: Frame, texel_sizes: np.ndarray, gbuffer: GBuff
     mask = truth.reflector_mask
     comparison = Comparison(frame.image, truth.image, mask, frame.hits, truth.hits, texel_sizes, gbuffer)
     values = {metric.name: metric.of(comparison) for metric in all_metrics()}
-    return Row(frame.stats.seconds, {name: value for name, value in values.items() if value is not None})
+    errors = {name: value for name, value in values.items() if value is not None}
+    if frame.hits is None or truth.hits is None:
+        return Row(frame.stats.seconds, errors)
+    return Row(frame.stats.seconds, errors, errors_by_bounce(frame.hits, truth.hits, texel_sizes, mask))
 
 
 def error_table(rows: Mapping[str, Row], title: str) -> Table:
@@ -57,7 +65,8 @@ def error_table(rows: Mapping[str, Row], title: str) -> Table:
 
 
 def write_json(path: Path, scene: str, reference: str, rows: Mapping[str, Row]) -> None:
-    """Write ``compare.json``: the scene's file, the reference's name, and of each method seconds per stage and errors.
+    """Write ``compare.json``: the scene's file, the reference's name, and of each method seconds per stage, errors, and
+    the errors of each bounce.
 
     JSON has no infinity and no NaN: null stands for them.
 
@@ -67,6 +76,7 @@ def write_json(path: Path, scene: str, reference: str, rows: Mapping[str, Row]) 
     report: dict[str, object] = {"scene": scene, "reference": reference}
     for name, row in rows.items():
         errors = {key: value if np.isfinite(value) else None for key, value in row.errors.items()}
-        report[name] = {"seconds": dict(row.seconds), **errors}
+        bounces = {"bounces": [dataclasses.asdict(bounce) for bounce in row.bounces]} if row.bounces else {}
+        report[name] = {"seconds": dict(row.seconds), **errors, **bounces}
     with written_whole(path) as scratch:
         scratch.write_text(json.dumps(report) + "\n")

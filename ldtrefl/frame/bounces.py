@@ -16,6 +16,7 @@ from typing import Protocol
 import numpy as np
 import warp as wp
 
+from ldtrefl.base import budget
 from ldtrefl.device import launch
 from ldtrefl.device.stats import Stats
 from ldtrefl.frame.gbuffer import GBuffer
@@ -30,7 +31,7 @@ from ldtrefl.shading.surface import Surface, extended_coordinates, may_return, s
 from ldtrefl.tracing.closest_hits import closest_hits_kernel
 from ldtrefl.tracing.nothing import no_shadows
 from ldtrefl.tracing.object_sets import ObjectSets
-from ldtrefl.tracing.ray_buffers import HitBuffer, RayBuffer, empty_hits, empty_rays
+from ldtrefl.tracing.ray_buffers import HitBuffer, RayBuffer, RayEnds, empty_hits, empty_rays
 from ldtrefl.tracing.tracer import BoundTracer, Tracer, block_of
 from ldtrefl.world.records import LightingRecord, ObjectRecord
 from ldtrefl.world.top_level import TopLevel
@@ -38,6 +39,12 @@ from ldtrefl.world.top_level import TopLevel
 FARTHER = wp.constant(64.0)
 """Where a ray has come from more than this many of an object's radii away, its hit is placed by its barycentrics: along
 the ray it is rounded by the ray's length, which may be many times the object."""
+
+LATER_BYTES = 28
+"""Bytes for each ray of a later bounce: where it ends is kept. Measured, with what the heap loses between arrays."""
+
+MOST_BOUNCES = "reflection.max_bounces"
+"""What an error names for the user to make smaller."""
 
 
 @wp.func
@@ -174,7 +181,7 @@ class LaterBounce:
 
     numbers: np.ndarray
     """(m,) int32: of these rays among the first bounce's."""
-    hits: HitBuffer
+    ends: RayEnds
     """Of each of them."""
 
 
@@ -215,21 +222,27 @@ class RayFollower:
             return self.guide.regions(self.gbuffer, rays, bounce, self.stats)
 
     def follow(self, rays: RayBuffer, regions: Regions) -> FollowedRays:
-        """Follow rays until they end; ``regions`` are the first bounce's."""
+        """Follow rays until they end; ``regions`` are the first bounce's.
+
+        Raises:
+            InputError: to keep where the rays of all bounces end needs more memory than is allowed.
+        """
         device, count = self.gbuffer.scene.device, rays.pixel.shape[0]
         radiance, numbers = wp.zeros(count, dtype=wp.vec3, device=device), np.arange(count, dtype=np.int32)
         hits, onwards = self._bounce(rays, regions, None, radiance, is_last=self.limits.most == 1)
         followed = FollowedRays(rays, regions.sets, hits, radiance, onwards.source)
         later = []
-        for bounce in range(1, self.limits.most):
-            left = np.flatnonzero(onwards.source.numpy() >= 0)
-            if len(left) == 0:
-                break
-            numbers, going = numbers[left], taken(onwards, left)
-            regions = self._regions(going, bounce)
-            is_last = bounce + 1 == self.limits.most
-            hits, onwards = self._bounce(going, regions, numbers, radiance, is_last=is_last)
-            later.append(LaterBounce(numbers, hits))
+        with budget.given_back():
+            for bounce in range(1, self.limits.most):
+                left = np.flatnonzero(onwards.source.numpy() >= 0)
+                if len(left) == 0:
+                    break
+                budget.take(LATER_BYTES * len(left), f"bounce {bounce + 1} of the reflected rays", MOST_BOUNCES)
+                numbers, going = numbers[left], taken(onwards, left)
+                regions = self._regions(going, bounce)
+                is_last = bounce + 1 == self.limits.most
+                hits, onwards = self._bounce(going, regions, numbers, radiance, is_last=is_last)
+                later.append(LaterBounce(numbers, RayEnds.of(going, hits)))
         return replace(followed, later=tuple(later))
 
     def _bounce(

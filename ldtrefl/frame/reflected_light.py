@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 import warp as wp
 
+from ldtrefl.frame.bounce_hits import FirstHits
 from ldtrefl.frame.bounces import FollowedRays
-from ldtrefl.frame.first_hits import FirstHits
 from ldtrefl.world.device_mesh import DeviceMesh
 
 

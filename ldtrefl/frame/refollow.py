@@ -106,6 +106,6 @@ def follow_changed(
         again = follower.follow(part, Regions(sets_for_runs(regions.sets, runs), regions.shown))
         inputs = [chosen, again.hits, again.radiance, again.source_onwards, hits, radiance, source_onwards]
         launch(put_back, count, inputs, device)
-        later = tuple(LaterBounce(numbers[bounce.numbers], bounce.hits) for bounce in again.later)
+        later = tuple(LaterBounce(numbers[bounce.numbers], bounce.ends) for bounce in again.later)
     follower.stats.count("rays_kept", rays.pixel.shape[0] - count)
     return FollowedRays(rays, regions.sets, hits, radiance, source_onwards, later)

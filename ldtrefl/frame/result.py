@@ -13,14 +13,17 @@ import warp as wp
 
 from ldtrefl.base import budget
 from ldtrefl.device.stats import Stats
+from ldtrefl.frame.bounce_hits import BounceHits, FirstHits
 from ldtrefl.frame.composite import reflection_picture
-from ldtrefl.frame.first_hits import FirstHits
 from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.history import FrameParts
-from ldtrefl.tracing.ray_buffers import HitBuffer, RayBuffer, joined
+from ldtrefl.tracing.ray_buffers import RayBuffer, RayEnds, joined
 
 HIT_BYTES = 112
 """Bytes for each pixel that sees a reflector: its ray and where that ends, joined from all bands."""
+
+LATER_HIT_BYTES = 32
+"""Bytes for each ray of a later bounce: where it ends, in its band and joined from all bands."""
 
 SMALLER = "camera.width or camera.height"
 """What an error names for the user to make smaller."""
@@ -68,7 +71,8 @@ class Frame:
 
     @functools.cached_property
     def hits(self) -> FirstHits | None:
-        """Where the first reflected rays ended; None for methods without rays."""
+        """Where the first reflected rays ended, and in ``hits.later`` those that went on from there; None for methods
+        without rays."""
         return self._source.hits()
 
 
@@ -104,7 +108,7 @@ class WholeFrame:
 
     def hits(self) -> FirstHits | None:
         """``Frame.hits``: a copy of this frame's own, for hits keep the pictures that they have been asked for."""
-        return None if self.first_hits is None else dataclasses.replace(self.first_hits)
+        return None if self.first_hits is None else self.first_hits.without_pictures()
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,21 +136,37 @@ class BandedFrame:
     def hits(self) -> FirstHits | None:
         """``Frame.hits``."""
         height, width = self.mask.shape
-        rays = f"the reflected rays of an image of {width} x {height} pixels"
-        budget.take(HIT_BYTES * int(np.count_nonzero(self.mask)), rays, SMALLER)
-        found = []
-        for parts in self.render_bands():
-            if parts.reflected.hits is None and parts.gbuffer.reflector_pixels.shape[0]:
-                return None
-            if parts.reflected.hits is not None:
-                found.append((parts.gbuffer.band.first_row * width, parts.reflected.hits))
-        if not found:
-            return None
-        together = joined(RayBuffer, [hits.rays for _, hits in found])
-        pixels = np.concatenate([first + hits.rays.pixel.numpy() for first, hits in found])
-        together.pixel = wp.array(pixels, dtype=wp.int32, device=together.origin.device)
-        ends = joined(HitBuffer, [hits.ends for _, hits in found])
-        return FirstHits((height, width), together, ends, found[0][1].device_units_per_world_unit)
+        of_image = f"of an image of {width} x {height} pixels"
+        with budget.given_back():
+            budget.take(HIT_BYTES * int(np.count_nonzero(self.mask)), f"the reflected rays {of_image}", SMALLER)
+            found = []
+            for parts in self.render_bands():
+                hits = parts.reflected.hits
+                if hits is None and parts.gbuffer.reflector_pixels.shape[0]:
+                    return None
+                if hits is not None:
+                    later = sum(bounce.ends.pixel.shape[0] for bounce in hits.later)
+                    budget.take(LATER_HIT_BYTES * later, f"the rays of all bounces {of_image}", SMALLER)
+                    found.append((parts.gbuffer.band.first_row * width, hits))
+            return _joined_hits((height, width), found) if found else None
+
+
+def _joined_hits(shape: tuple[int, int], bands: list[tuple[int, FirstHits]]) -> FirstHits:
+    """The hits of an image from those of its bands, each with the number of its first pixel."""
+    units = bands[0][1].device_units_per_world_unit
+
+    def joined_bounce(bounces: list[tuple[int, BounceHits]]) -> BounceHits:
+        ends = RayEnds.joined([bounce.ends for _, bounce in bounces])
+        pixel = np.concatenate([first + bounce.ends.pixel.numpy() for first, bounce in bounces])
+        in_image = wp.array(pixel, dtype=wp.int32, device=ends.t.device)
+        return BounceHits(shape, dataclasses.replace(ends, pixel=in_image), units)
+
+    first = joined_bounce([(pixel, hits) for pixel, hits in bands])
+    rays = joined(RayBuffer, [hits.rays for _, hits in bands])
+    rays.pixel = first.ends.pixel
+    most = max(len(hits.later) for _, hits in bands)
+    later = [[(pixel, hits.later[k]) for pixel, hits in bands if k < len(hits.later)] for k in range(most)]
+    return FirstHits(shape, first.ends, units, rays, tuple(joined_bounce(bounces) for bounces in later))
 
 
 def rows_of(gbuffer: GBuffer) -> slice:

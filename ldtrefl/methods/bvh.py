@@ -12,8 +12,8 @@ needs a new tree.
 from __future__ import annotations
 
 from ldtrefl.device.stats import Stats
+from ldtrefl.frame.bounce_hits import FirstHits
 from ldtrefl.frame.bounces import RayFollower, summed_by_pixel
-from ldtrefl.frame.first_hits import FirstHits
 from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.history import Reusable
 from ldtrefl.frame.reflected_light import ReflectedLight

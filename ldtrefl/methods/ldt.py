@@ -22,9 +22,9 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from ldtrefl.device.stats import Stats
+from ldtrefl.frame.bounce_hits import FirstHits
 from ldtrefl.frame.bounces import FollowedRays, RayFollower, summed_by_pixel
 from ldtrefl.frame.camera_shading import first_rays
-from ldtrefl.frame.first_hits import FirstHits
 from ldtrefl.frame.flat_regions import flat_regions
 from ldtrefl.frame.footprint import finest_footprints
 from ldtrefl.frame.gbuffer import GBuffer

@@ -7,6 +7,7 @@ they bring can be summed in a fixed order.
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from dataclasses import dataclass, fields
 from typing import TypeVar
 
 import numpy as np
@@ -40,6 +41,30 @@ class HitBuffer:
     barycentrics: wp.array(dtype=wp.vec2)  # weights of the second and third corner; below 0 if one stands for many
     steps: wp.array(dtype=wp.int32)  # texels, samples or nodes looked at
     searches: wp.array(dtype=wp.int32)  # objects that the ray was searched for in
+
+
+@dataclass(frozen=True, eq=False)
+class RayEnds:
+    """Where rays end, and no more: what is kept of them beyond their bounce. The arrays are those of the buffers."""
+
+    pixel: wp.array
+    """(n,) int32 to which each contributes."""
+    t: wp.array
+    """(n,) float device units, +inf on a miss."""
+    object: wp.array
+    """(n,) int32, -1 on a miss."""
+    triangle: wp.array
+    """(n,) int32, -1 on a miss."""
+
+    @classmethod
+    def of(cls, rays: RayBuffer, hits: HitBuffer) -> RayEnds:
+        """The ends of a buffer's rays."""
+        return cls(rays.pixel, hits.t, hits.object, hits.triangle)
+
+    @classmethod
+    def joined(cls, parts: Sequence[RayEnds]) -> RayEnds:
+        """The ends of several parts, one after another."""
+        return cls(*(_joined([getattr(part, field.name) for part in parts]) for field in fields(cls)))
 
 
 @wp.func
@@ -121,10 +146,14 @@ def joined(kind: type[Buffer], buffers: Sequence[Buffer]) -> Buffer:
     """The rays of several buffers, one after another in one; ``kind`` is their type."""
     made = kind()
     for name in _arrays_of(kind):
-        arrays = [getattr(buffer, name) for buffer in buffers]
-        values = np.concatenate([array.numpy() for array in arrays])
-        setattr(made, name, wp.array(values, dtype=arrays[0].dtype, device=arrays[0].device))
+        setattr(made, name, _joined([getattr(buffer, name) for buffer in buffers]))
     return made
+
+
+def _joined(arrays: Sequence[wp.array]) -> wp.array:
+    """Arrays one after another in one."""
+    values = np.concatenate([array.numpy() for array in arrays])
+    return wp.array(values, dtype=arrays[0].dtype, device=arrays[0].device)
 
 
 def _arrays_of(kind: type) -> list[str]:

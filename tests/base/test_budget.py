@@ -82,3 +82,23 @@ def test_an_account_adds_up_and_one_inside_it_goes_on() -> None:
             budget.take(40, "a shape")
         assert outer.taken == 100
     budget.take(100, "another scene's mesh")
+
+
+def test_what_is_given_back_can_be_taken_again() -> None:
+    budget.set_memory_limit(100)
+    with budget.account() as account:
+        budget.take(60, "a mesh")
+        for _ in range(3):
+            with budget.given_back():
+                budget.take(30, "a ray")
+                with pytest.raises(InputError, match="another ray needs 11 bytes beside 90 bytes"):
+                    budget.take(11, "another ray")
+            assert account.taken == 60
+        with pytest.raises(KeyError), budget.given_back():
+            budget.take(40, "a ray")
+            raise KeyError
+        assert account.taken == 60
+    with budget.given_back():  # outside an account, too, what is asked for inside adds up
+        budget.take(60, "a ray")
+        with pytest.raises(InputError, match="beside 60 bytes"):
+            budget.take(41, "a ray")

@@ -8,6 +8,7 @@ import pytest
 from rich.console import Console
 
 import ldtrefl
+from ldtrefl.compare.bounces import BounceErrors
 from ldtrefl.compare.metrics import all_metrics
 from ldtrefl.compare.report import Row, compared, error_table, write_json
 from tests.conftest import SMALL_SCENE
@@ -29,6 +30,7 @@ def test_every_metric_that_can_be_is_taken(rows: dict[str, Row]) -> None:
     assert list(rows["ldt"].errors) == [metric.name for metric in all_metrics()]
     # The cube map has no rays, so nothing is known of hits.
     assert list(rows["envmap"].errors) == [metric.name for metric in all_metrics() if "hits" not in metric.needs]
+    assert [bounce.bounce for bounce in rows["ldt"].bounces] == [1] and rows["envmap"].bounces == ()
     assert rows["ldt"].errors["ssim"] > 0.999 > rows["envmap"].errors["ssim"]
     assert {"gbuffer", "peel", "march", "shade"} <= set(rows["ldt"].seconds)
 
@@ -55,11 +57,17 @@ def test_the_table_has_a_column_for_each_heading(rows: dict[str, Row]) -> None:
     assert envmap.count(" - ") == sum("hits" in metric.needs for metric in all_metrics() if metric.heading is not None)
 
 
-def test_json_has_no_infinity(tmp_path: Path) -> None:
+def test_json_has_every_bounce_and_no_infinity(tmp_path: Path) -> None:
     row = Row({"march": 0.5}, {"psnr": float("inf"), "p99": float("nan"), "ssim": 0.5})
-    write_json(tmp_path / "compare.json", "scene.toml", "bvh", {"ldt": row})
+    by_bounce = Row({}, {}, (BounceErrors(1, 9, 1, 2, 3), BounceErrors(2, 8, 4, 5, 6)))
+    write_json(tmp_path / "compare.json", "scene.toml", "bvh", {"ldt": row, "other": by_bounce})
+    names = ("bounce", "compared", "wrong_hits", "wrong_misses", "wrong_objects")
     assert json.loads((tmp_path / "compare.json").read_text()) == {
         "scene": "scene.toml",
         "reference": "bvh",
         "ldt": {"seconds": {"march": 0.5}, "psnr": None, "p99": None, "ssim": 0.5},
+        "other": {
+            "seconds": {},
+            "bounces": [dict(zip(names, values, strict=True)) for values in ((1, 9, 1, 2, 3), (2, 8, 4, 5, 6))],
+        },
     }

@@ -141,6 +141,12 @@ class Reflection:
     """To the first hit; inf on a miss."""
     object: np.ndarray
     radiance: np.ndarray
+    later_followed: np.ndarray
+    """(n, k) bool: whether the ray was followed to the second bounce, the third, ..."""
+    later_distance: np.ndarray
+    """(n, k)"""
+    later_object: np.ndarray
+    """(n, k)"""
 
 
 def _way(given: Scene, bounces: int, shift: tuple[float, float]) -> tuple[Reflection, np.ndarray]:
@@ -159,7 +165,7 @@ def _way(given: Scene, bounces: int, shift: tuple[float, float]) -> tuple[Reflec
     for bounce in range(bounces):
         alive = source >= 0
         t, hit, axis = closest_hits(origin, direction, source, place)
-        ends.append((t, hit))
+        ends.append((alive, np.where(alive, t, np.inf), np.where(alive, hit, -1)))
         is_hit, is_miss = alive & (hit >= 0), alive & (hit < 0)
         onwards = np.where(np.arange(3) == axis[:, None], -direction, direction)
         light = direct[hit]
@@ -171,8 +177,9 @@ def _way(given: Scene, bounces: int, shift: tuple[float, float]) -> tuple[Reflec
         origin = origin + np.where(is_hit, t, 0.0)[:, None] * direction
         direction, source = onwards, np.where(is_hit & (mirror[hit].max(axis=1) > 0), hit, -1)
         met += [np.where(alive, hit, -2), np.where(alive, axis, -2)]
-    pixels = np.arange(len(direction))
-    return Reflection(pixels, *first, ends[0][0], ends[0][1], radiance), np.stack(met, axis=1)
+    pixels, nothing = np.arange(len(direction)), np.empty((len(direction), 0))
+    later = [np.stack(values, axis=1) for values in zip(*ends[1:], strict=True)] or [nothing] * 3
+    return Reflection(pixels, *first, ends[0][1], ends[0][2], radiance, *later), np.stack(met, axis=1)
 
 
 def reflection(given: Scene, bounces: int = 1) -> Reflection:

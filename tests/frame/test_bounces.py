@@ -5,8 +5,9 @@ import pytest
 import warp as wp
 
 import ldtrefl
+from ldtrefl.base import budget
 from ldtrefl.device import launch
-from ldtrefl.frame.bounces import summed_by_pixel
+from ldtrefl.frame.bounces import LATER_BYTES, summed_by_pixel
 from ldtrefl.tracing.ray_buffers import RayBuffer, empty_rays
 from tests.frame import flat_mirror
 
@@ -61,12 +62,28 @@ def test_later_bounces_tell_which_rays_they_are_and_where_they_end() -> None:
     (later,) = followed.later
     source, first = shaded.rays.source.numpy(), followed.hits.object.numpy()
     np.testing.assert_array_equal(later.numbers, np.flatnonzero(first >= 0))
+    np.testing.assert_array_equal(later.ends.pixel.numpy(), shaded.rays.pixel.numpy()[later.numbers])
     np.testing.assert_array_equal(followed.source_onwards.numpy(), first)
     sent_back = (source[later.numbers] == flat_mirror.GROUND) & (first[later.numbers] == flat_mirror.BOX)
-    t, t_first = later.hits.t.numpy()[sent_back], followed.hits.t.numpy()[later.numbers][sent_back]
-    is_bottom = later.hits.object.numpy()[sent_back] == flat_mirror.GROUND
+    t, t_first = later.ends.t.numpy()[sent_back], followed.hits.t.numpy()[later.numbers][sent_back]
+    is_bottom = later.ends.object.numpy()[sent_back] == flat_mirror.GROUND
     assert is_bottom.sum() > 20
     np.testing.assert_allclose(t[is_bottom], t_first[is_bottom], rtol=1e-5)
+
+
+def test_rays_of_bounces_that_need_too_much_memory_are_refused() -> None:
+    """Where the rays of all bounces end is kept: the limit is on their sum, and they take nothing of the next frame."""
+    gbuffer, shaded = flat_mirror.seen_and_shaded(flat_mirror.on_device(flat_mirror.scene((0.1, 0.2, 0.8), 0.5)))
+    follower = flat_mirror.follower(gbuffer, 4)
+    regions = follower.first_regions(shaded.rays)
+    rays = [len(bounce.numbers) for bounce in follower.follow(shaded.rays, regions).later]
+    budget.set_memory_limit(LATER_BYTES * sum(rays))
+    with budget.account() as account:
+        for _ in range(2):
+            assert len(follower.follow(shaded.rays, regions).later) == 3 and account.taken == 0
+    budget.set_memory_limit(LATER_BYTES * sum(rays) - 1)
+    with pytest.raises(ldtrefl.InputError, match=r"bounce 4 of the reflected rays needs .*reflection\.max_bounces"):
+        follower.follow(shaded.rays, regions)
 
 
 def test_rays_and_searches_are_counted() -> None:

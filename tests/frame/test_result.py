@@ -12,13 +12,14 @@ from ldtrefl.base import budget
 from ldtrefl.device import launch
 from ldtrefl.device.stats import Stats
 from ldtrefl.frame import visibility
+from ldtrefl.frame.bounce_hits import FirstHits
 from ldtrefl.frame.camera_shading import shade_gbuffer
-from ldtrefl.frame.first_hits import FirstHits
 from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.history import FrameParts
 from ldtrefl.frame.reflected_light import ReflectedLight
 from ldtrefl.frame.result import BandedFrame, Frame, WholeFrame, rows_of
 from ldtrefl.frame.visibility import draw_in_bands
+from ldtrefl.scene.description import Scene
 from ldtrefl.tracing.nothing import no_shadows
 from tests.frame import flat_mirror
 
@@ -65,24 +66,26 @@ def test_a_whole_frame_has_radiance_at_its_pixels() -> None:
     assert reflector.numpy().tolist() == [0, 1, 0, 0, 1, 0], "the mask is the caller's"
 
 
-def parts_of(gbuffer: GBuffer, *, has_rays: bool = True) -> FrameParts:
+def parts_of(gbuffer: GBuffer, bounces: int, *, has_rays: bool = True) -> FrameParts:
     """A band, its reflections by ray casting."""
     shaded = shade_gbuffer(gbuffer, no_shadows(gbuffer.scene.device), starts_rays=True)
-    follower = flat_mirror.follower(gbuffer)
+    follower = flat_mirror.follower(gbuffer, bounces)
     followed = follower.follow(shaded.rays, follower.first_regions(shaded.rays))
     hits = FirstHits.of(gbuffer, followed) if has_rays else None
     return FrameParts(gbuffer, shaded, ReflectedLight(followed.radiance, hits), ())
 
 
-def banded(monkeypatch: pytest.MonkeyPatch, *, has_rays: bool = True) -> BandedFrame:
+def banded(
+    monkeypatch: pytest.MonkeyPatch, given: Scene | None = None, bounces: int = 1, *, has_rays: bool = True
+) -> BandedFrame:
     """The flat mirror's image in bands of 16 rows, of which the first see no mirror."""
-    scene = flat_mirror.on_device(flat_mirror.scene())
+    scene = flat_mirror.on_device(given or flat_mirror.scene())
     camera = scene.scene.camera
     monkeypatch.setattr(visibility, "BAND_PIXELS", 16 * camera.width)
 
     def bands() -> Iterator[FrameParts]:
         for gbuffer in draw_in_bands(scene, camera):
-            yield parts_of(gbuffer, has_rays=has_rays)
+            yield parts_of(gbuffer, bounces, has_rays=has_rays)
 
     mask = np.empty((camera.height, camera.width), bool)
     for parts in bands():
@@ -100,6 +103,24 @@ def test_bands_make_the_pictures_of_the_whole_image(monkeypatch: pytest.MonkeyPa
     np.testing.assert_allclose(hits.distance.ravel()[expected.pixels], expected.distance, rtol=1e-5)
     np.testing.assert_array_equal(hits.object.ravel()[expected.pixels], expected.object)
     assert (hits.object[~frame.reflector_mask()] == -1).all()
+
+
+def test_bands_make_the_later_hits_of_the_whole_image(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The last bounces are of some bands alone."""
+    given, bounces = flat_mirror.scene(place=(0.1, 0.2, 0.8), box_mirror=0.5), 4
+    frame, expected = banded(monkeypatch, given, bounces), flat_mirror.reflection(given, bounces)
+    hits = frame.hits()
+    assert hits is not None and len(hits.later) == bounces - 1
+    numbers = [len(parts.reflected.hits.later) for parts in frame.render_bands() if parts.reflected.hits is not None]
+    assert min(numbers) < bounces - 1 == max(numbers)
+    for k, bounce in enumerate(hits.later):
+        for found, known in (
+            (bounce.followed, expected.later_followed),
+            (bounce.object, expected.later_object),
+        ):
+            np.testing.assert_array_equal(found.ravel()[expected.pixels], known[:, k])
+        known_distance = expected.later_distance[:, k]
+        np.testing.assert_allclose(bounce.distance.ravel()[expected.pixels], known_distance, rtol=1e-5)
 
 
 def test_bands_of_a_method_without_rays_have_no_hits(monkeypatch: pytest.MonkeyPatch) -> None:

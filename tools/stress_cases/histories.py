@@ -107,12 +107,13 @@ def difference(frame: ldtrefl.Frame, other: ldtrefl.Frame) -> str:
     for name in ("image", "reflection", "reflector_mask"):
         if getattr(frame, name).tobytes() != getattr(other, name).tobytes():
             return name
-    if (frame.hits is None) != (other.hits is None):
-        return "hits"
-    for name in ("distance", "object", "triangle"):
-        if frame.hits is not None and other.hits is not None:
-            if getattr(frame.hits, name).tobytes() != getattr(other.hits, name).tobytes():
-                return f"hits.{name}"
+    mine, right = (() if hits is None else (hits, *hits.later) for hits in (frame.hits, other.hits))
+    if len(mine) != len(right):
+        return "the number of bounces"
+    for bounce, (hits, expected) in enumerate(zip(mine, right, strict=True), start=1):
+        for name in ("distance", "object", "triangle"):
+            if getattr(hits, name).tobytes() != getattr(expected, name).tobytes():
+                return f"{name} at bounce {bounce}"
     return ""
 
 

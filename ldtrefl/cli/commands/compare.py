@@ -12,6 +12,7 @@ from ldtrefl.base.errors import InputError, printable
 from ldtrefl.cli.options import Device, Memory, SceneFile, Threads, parsed_settings, use_resources
 from ldtrefl.cli.printing import say, stage_times
 from ldtrefl.cli.progress import progress_bar
+from ldtrefl.compare.bounces import bounce_table
 from ldtrefl.compare.difference import difference_image
 from ldtrefl.compare.report import Row, compared, error_table, write_json
 from ldtrefl.files.atomic_write import writable_folder
@@ -66,6 +67,9 @@ def compare(
     write_json(folder / "compare.json", str(scene), reference, rows)
     title = f"{scene} against {reference} ({truth.reflector_mask.sum()} reflector pixels)"
     say(error_table(rows, printable(title)))
+    by_bounce = {name: row.bounces for name, row in rows.items() if len(row.bounces) > 1}
+    if by_bounce:
+        say(bounce_table(by_bounce, "where rays end, bounce by bounce"))
     say(f"{reference}: {sum(truth.stats.seconds.values()):.3f} s", stage_times(truth))
     say(f"images in {folder}")
 

@@ -21,7 +21,7 @@ from typing import Generic, ParamSpec
 
 import numpy as np
 
-from ldtrefl.frame.first_hits import FirstHits
+from ldtrefl.frame.bounce_hits import FirstHits
 from ldtrefl.frame.gbuffer import GBuffer
 
 Parameters = ParamSpec("Parameters")

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ldtrefl.compare.metrics.base import metric
-from ldtrefl.frame.first_hits import FirstHits
+from ldtrefl.frame.bounce_hits import FirstHits
 
 
 @metric("wrong_hits", heading="wrong hit %", format=".3f", place=50)

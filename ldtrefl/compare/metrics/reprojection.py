@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ldtrefl.compare.metrics.base import metric
-from ldtrefl.frame.first_hits import FirstHits
+from ldtrefl.frame.bounce_hits import FirstHits
 from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.tracing.ray_buffers import distance_across
 

@@ -24,6 +24,25 @@ def test_it_writes_pictures_and_errors(run: Callable[..., Done], scene_folder: P
     report = json.loads((scene_folder / "made" / "compare.json").read_text())
     assert list(report) == ["scene", "reference", "ldt", "envmap"] and report["reference"] == "bvh"
     assert report["ldt"]["ssim"] > 0.99 and "wrong_hits" not in report["envmap"]
+    assert (
+        "bounce by bounce" not in done.output
+        and len(report["ldt"]["bounces"]) == 1
+        and "bounces" not in report["envmap"]
+    )
+
+
+def test_mirrors_in_mirrors_are_compared_bounce_by_bounce(run: Callable[..., Done], scene_folder: Path) -> None:
+    """A second ball beside the first: rays go to and fro."""
+    other = SMALL_SCENE[SMALL_SCENE.index("[[object]]") : SMALL_SCENE.rindex("[[object]]")]
+    text = SMALL_SCENE + other.replace("[object.material]", "translate = [-2.1, 0.0, 0.0]\n[object.material]")
+    (scene_folder / "balls.toml").write_text(text)
+    done = run("compare", "balls.toml", "--methods", "ldt,envmap", "--set", "bvh.max_bounces=3")
+    assert done.status == 0 and "bounce by bounce" in done.output and "rays compared" in done.output
+    bounces = json.loads((scene_folder / "balls-compare" / "compare.json").read_text())["ldt"]["bounces"]
+    assert [row["bounce"] for row in bounces] == [1, 2, 3]
+    compared = [row["compared"] for row in bounces]
+    assert compared == sorted(compared, reverse=True) and compared[2] > 0
+    assert all(row[f"wrong_{what}"] == 0 for row in bounces for what in ("hits", "misses", "objects"))
 
 
 def test_any_method_may_be_the_truth(run: Callable[..., Done], scene_folder: Path) -> None:

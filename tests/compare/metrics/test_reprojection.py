@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ldtrefl.compare.metrics import reprojection, reprojection_errors
-from ldtrefl.frame.first_hits import FirstHits
+from ldtrefl.frame.bounce_hits import FirstHits
 from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.renderer import Renderer
 from ldtrefl.scene.description import Camera, Material, Object, Scene
