@@ -14,7 +14,7 @@ from stress_cases.files import MEMORY, SECONDS, Case, fault_of_picture, fault_of
 from stress_cases.inputs import rays_about
 from stress_cases.judge import judge
 from stress_cases.outcomes import DENSE, EXACT
-from stress_cases.pictures import Held, Reference, judge_frame, shows_enough, surroundings
+from stress_cases.pictures import Held, judge_frame, reflected_hits, shows_enough, surroundings
 from stress_cases.truth import Truth
 
 import ldtrefl
@@ -144,7 +144,7 @@ def test_a_picture_of_wrong_reflections_is_found() -> None:
     ball = ldtrefl.Object(shape="sphere", params={"segments": [32, 16]}, material=ldtrefl.Material(mirror=(1, 1, 1)))
     camera = ldtrefl.Camera(eye=(0.4, -4, 0.5), look_at=(0, 0, 0), width=40, height=40, fov_y=40.0)
     scene = ldtrefl.Scene(camera=camera, objects=(ball, surroundings()))
-    reference = Reference(scene).reflected_hits()
+    reference = reflected_hits(scene)
     mirrors, texels = reference[0] == 0, np.array([2.0, 16.0]) / 256
     frame = ldtrefl.render(scene, "ldt")
     assert judge_frame(frame, reference, mirrors, texels, Held(), False).passed

@@ -14,6 +14,7 @@ from .pictures import Held, judge_reflections, surroundings
 NAME = "6 cameras"
 MIRROR = ldtrefl.Material(albedo=(0.05,) * 3, mirror=(0.9,) * 3)
 HELD = {
+    "inside the mirror ball": Held(linear_percent=5.0, linear_off=4.0),
     # Whether an eye on the surface sees it or what lies behind it is decided by rounding: pictures must be finite.
     "on the mirror ball": Held(percent=100.0, linear_percent=100.0, lost=1.0),
     "inside the object": Held(reflector=0.0, hits=0.0),

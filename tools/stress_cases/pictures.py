@@ -1,8 +1,4 @@
-"""What the cases about pictures share: frames by every method, and a reference for where reflected rays end.
-
-The reference makes camera rays and reflected rays in float64 and traces them by Embree. It uses no code of ours but
-that of the scene.
-"""
+"""What the cases about pictures share: frames by every method, and what they are held to where reflected rays end."""
 
 from __future__ import annotations
 
@@ -15,9 +11,8 @@ import numpy as np
 import ldtrefl
 from ldtrefl.scene import shapes
 
-from .inputs import camera_rays
 from .outcomes import LINEAR_WORST, TEXELS, Outcome
-from .truth import Truth
+from .paths import paths_of
 
 OFF = 0.5
 """Texels from the true distance beyond which a reflected ray ends elsewhere."""
@@ -71,67 +66,12 @@ def surroundings(scale: float = 8.0) -> ldtrefl.Object:
     return ldtrefl.Object(mesh=ldtrefl.Mesh(room.vertices, room.faces[np.arange(len(room.faces)) % 3 > 0]), scale=scale)
 
 
-class Reference:
-    """Camera rays and reflected rays of a scene, made in float64 and traced by Embree."""
-
-    def __init__(self, scene: ldtrefl.Scene) -> None:
-        self.scene = scene
-        meshes = []
-        for entry in scene.objects:
-            matrix, mesh = entry.world_from_object(), entry.geometry
-            meshes.append(ldtrefl.Mesh(mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3], mesh.faces))
-        self.truths = [Truth(mesh, always_embree=True) for mesh in meshes]
-
-    def first(self, o: np.ndarray, d: np.ndarray, without: np.ndarray | None = None) -> tuple[np.ndarray, ...]:
-        """(n,) t, object and triangle of first hits; ``without`` holds an object for each ray to pass through."""
-        t, index, triangle = np.full(len(o), np.inf), np.full(len(o), -1), np.full(len(o), -1)
-        for k, truth in enumerate(self.truths):
-            found, number = truth.first_hits(o, d)
-            if without is not None:
-                found = np.where(without == k, np.inf, found)
-            nearer = found < t
-            t, index, triangle = (
-                np.where(nearer, found, t),
-                np.where(nearer, k, index),
-                np.where(nearer, number, triangle),
-            )
-        return t, index, triangle
-
-    def normals(self, k: int, triangles: np.ndarray, points: np.ndarray, view: np.ndarray) -> np.ndarray:
-        """(n, 3) unit shading normals of object ``k`` on the viewer's side."""
-        mesh, entry = self.truths[k].mesh, self.scene.objects[k]
-        a, b, c = (mesh.vertices[mesh.faces[triangles, i]] for i in range(3))
-        facet = np.cross(b - a, c - a)
-        facet *= -np.sign((facet * view).sum(axis=1, keepdims=True))
-        normal = facet
-        if entry.smooth:
-            area = (facet * facet).sum(axis=1)
-            weights = [
-                np.abs((np.cross(q - points, r - points) * facet).sum(axis=1)) / area
-                for q, r in ((b, c), (c, a), (a, b))
-            ]
-            corners = entry.geometry.normals[entry.geometry.faces[triangles]]
-            mixed = sum(w[:, None] * corners[:, i] for i, w in enumerate(weights))
-            normal = mixed @ np.linalg.inv(entry.world_from_object()[:3, :3])
-            normal *= np.sign((normal * facet).sum(axis=1, keepdims=True))
-        return normal / np.linalg.norm(normal, axis=1, keepdims=True)
-
-    def reflected_hits(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """(h, w) arrays: object seen, distance of the reflected ray's hit, and the object hit."""
-        camera = self.scene.camera
-        shape = camera.height, camera.width
-        o, d = camera_rays(camera)
-        t, seen, triangle = self.first(o, d)
-        distance, hit = np.full(len(o), np.inf), np.full(len(o), -1)
-        for k, entry in enumerate(self.scene.objects):
-            at = np.flatnonzero(seen == k)
-            if entry.is_reflector and len(at):
-                way = d[at] / np.linalg.norm(d[at], axis=1, keepdims=True)
-                points = o[at] + t[at, None] * d[at]
-                normal = self.normals(k, triangle[at], points, way)
-                onwards = way - 2 * (way * normal).sum(axis=1, keepdims=True) * normal
-                distance[at], hit[at], _ = self.first(points, onwards, np.full(len(at), k))
-        return seen.reshape(shape), distance.reshape(shape), hit.reshape(shape)
+def reflected_hits(scene: ldtrefl.Scene) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(h, w) arrays: object seen, distance of the reflected ray's hit, and the object hit, by :func:`paths_of`."""
+    seen, reflected = (*paths_of(scene, 1).ends, None)[:2]
+    if reflected is None:  # no mirror is seen
+        return seen.object, np.full(seen.object.shape, np.inf), np.full(seen.object.shape, -1)
+    return seen.object, reflected.distance, reflected.object
 
 
 @dataclass(frozen=True)
@@ -142,7 +82,10 @@ class Held:
     """Percent of the reflector's pixels that may end on another object, or ``OFF`` texels or more from the true
     distance; one pixel may in any case."""
     linear_percent: float = 2.0
-    """The same for the paper's search, ``LINEAR_WORST`` texels or more."""
+    """The same for the paper's search, ``linear_off`` texels or more."""
+    linear_off: float = LINEAR_WORST
+    """More where a mirror sees itself: this search starts two texels and a half above its own surface, and ends as much
+    before it, or several times as much along it."""
     lost: float = 0.002
     """Share of the reflector's pixels that the renderer or the reference alone may see, silhouettes; one pixel may in
     any case."""
@@ -153,9 +96,9 @@ class Held:
 
 
 def judge_reflections(case: str, what: str, scene: ldtrefl.Scene, held: Held | None = None) -> list[Outcome]:
-    """Where reflected rays end, against :class:`Reference`, on the pixels that see the same reflector."""
+    """Where reflected rays end, against float64, on the pixels that see the same reflector."""
     held = held or Held()
-    reference = Reference(scene).reflected_hits()
+    reference = reflected_hits(scene)
     mirrors = np.array([entry.is_reflector for entry in scene.objects] + [False])[reference[0]]
     is_shown = shows_enough(mirrors, reference[2] >= 0, held)
     texels = np.array([2 * half / TEXELS for half in _halves(scene)])
@@ -184,10 +127,10 @@ def judge_frame(
     held: Held,
     is_linear: bool,
 ) -> Outcome:
-    """A frame against what :class:`Reference` saw, whose reflector's pixels are ``mirrors``, (h, w)."""
+    """A frame against what :func:`reflected_hits` says, whose reflector's pixels are ``mirrors``, (h, w)."""
     _, distance, hit = reference
     outcome = Outcome(non_finite=not_finite(frame))
-    allowed, worst = (held.linear_percent, LINEAR_WORST) if is_linear else (held.percent, OFF)
+    allowed, worst = (held.linear_percent, held.linear_off) if is_linear else (held.percent, OFF)
     outcome.limit = (
         f"<= {allowed:g}% of the reflector's pixels end elsewhere (by {worst:g} texels), all pixels finite; "
         f"a reflector in >= {100 * held.reflector:g}% of the pixels, hits in >= {100 * held.hits:g}% of those"

@@ -14,6 +14,8 @@ NAME = "7 reflectors"
 MIRROR = ldtrefl.Material(albedo=(0.05,) * 3, mirror=(0.9,) * 3)
 HELD = {
     "strongly bent under one pixel": Held(linear_percent=5.0, reflector=0.01),
+    "hollow": Held(linear_percent=5.0, linear_off=8.0),
+    "a saddle with several reflections of a point": Held(linear_percent=5.0, linear_off=8.0),
     # Smaller than the distance between pixels' centres, so that no pixel sees it.
     "a tenth of a pixel": Held(reflector=0.0, hits=0.0),
 }
