@@ -22,8 +22,9 @@ FOLDER = Path(__file__).parent.parent
 IMPORTED = re.compile(rf"^[ \t]*from {PACKAGE}(?:\.([\w.]+))? import (\([^)]*\)|.*)", re.MULTILINE)
 """A line that imports from the package: ``from package.a.b import c, d``, or with brackets over several lines."""
 
-NATIVE = re.compile(r'"([\w/]+\.h)"')
-"""The name of a file of C++ in a module's source, as ``native_sources.native_body`` takes it."""
+NATIVE = re.compile(r'"(\w+(?:/\w+)+\.h)"')
+"""The name of a file of C++ of this package in a module's source, as ``native_sources.native_body`` takes it: with its
+room. Names without one are other programs' files."""
 
 
 def fingerprint(module: str) -> str:
