@@ -55,6 +55,7 @@ CASES: dict[str, tuple[Size, Size]] = {  # name of the module -> full and quick 
     "outliers": (Size(4000, 0), Size(200, 0)),
     "shadows": (Size(0, 320), Size(0, 96)),
     "edges": (Size(1_000_000, 0), Size(20_000, 0)),
+    "watertight": (Size(10_000_000, 0), Size(100_000, 0)),
 }
 
 
