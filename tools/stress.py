@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 import importlib
 import json
+import math
 import sys
 import time
 from dataclasses import dataclass
@@ -56,6 +57,7 @@ CASES: dict[str, tuple[Size, Size]] = {  # name of the module -> full and quick 
     "shadows": (Size(0, 320), Size(0, 96)),
     "edges": (Size(1_000_000, 0), Size(20_000, 0)),
     "watertight": (Size(10_000_000, 0), Size(100_000, 0)),
+    "chrome": (Size(0, 256), Size(0, 64)),
 }
 
 
@@ -81,14 +83,14 @@ def table(outcomes: list[Outcome], seconds: float) -> str:
         "",
         "| case | what | by | tried | wrong hits | wrong misses | disagree | explained | within | defects | ",
     ]
-    lines[-1] += "misnamed | p99 | p99.9 | worst | non-finite | s | limit |  |"
-    lines += ["|" + "---|" * 18]
+    lines[-1] += "misnamed | p99 | p99.9 | worst | non-finite | SSIM | s | limit |  |"
+    lines += ["|" + "---|" * 19]
     for o in outcomes:
-        held = "" if o.passed else "**beyond**"
+        held, shown = "" if o.passed else "**beyond**", "" if math.isnan(o.ssim) else f"{o.ssim:.5f}"
         lines.append(
             f"| {o.case} | {o.what} | {o.by} | {o.tried} | {o.wrong_hits} | {o.wrong_misses} | {o.disagree} | "
             f"{o.explained} | {o.radius:g} | {o.defects} | {o.misnamed} | {o.p99:.3g} | {o.p999:.3g} | {o.worst:.3g} | "
-            f"{o.non_finite} | {o.seconds:.1f} | {o.limit} | {held} |"
+            f"{o.non_finite} | {shown} | {o.seconds:.1f} | {o.limit} | {held} |"
         )
     return "\n".join(lines) + "\n"
 

@@ -124,6 +124,8 @@ class Outcome:
     misnamed: int = 0
     """Hits whose triangle, barycentrics or normal are not those of the place where the ray ends."""
     non_finite: int = 0
+    ssim: float = float("nan")
+    """Over the reflectors' pixels; NaN where pictures are not compared so."""
     seconds: float = 0.0
     limit: str = ""
     passed: bool = True
