@@ -14,7 +14,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ldtrefl.base.notices import warn_once
 from ldtrefl.device.stats import Stats
+from ldtrefl.ldt.linear.closed_check import is_closed
 from ldtrefl.ldt.options import DEFAULT_RESOLUTION, LinearSteps, Quality
 from ldtrefl.ldt.peel import peel_mesh
 from ldtrefl.ldt.searches import TRACERS
@@ -83,6 +85,8 @@ class SceneMaps:
                 key = self._key(mesh, mesh in mirrors)
                 if key not in maps:
                     maps[key] = self._peeled(key, stats)
+                    if self.options.search == "linear":
+                        _warn_if_open(scene, mesh)
                 maps[key] = maps.pop(key)  # used last
             # Whatever was peeled for other frames has no part in this one.
             meshes = set(scene.meshes)
@@ -143,6 +147,16 @@ class SceneMaps:
         ]
         views = array_of_shared_views(of_meshes, scene.mesh_of, tracer.view, scene.device)
         return _Bound(current, BoundTracer(tracer, views, of_meshes))
+
+
+def _warn_if_open(scene: DeviceScene, mesh: DeviceMesh) -> None:
+    """Say of the first object with this mesh that the paper's search may not be right about it, if that is so."""
+    if not is_closed(mesh.mesh.vertices, mesh.faces):
+        first = scene.scene.objects[int(np.argmax(scene.mesh_of == scene.meshes.index(mesh)))]
+        warn_once(
+            f"object '{first.called}' is open, or wound both ways: search=linear tells inside from outside, and may "
+            "miss it or see it where it is not (search=exact does not)"
+        )
 
 
 def _mirrors(scene: DeviceScene) -> set[DeviceMesh]:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import logging
 import operator
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
@@ -37,6 +36,7 @@ from ldtrefl.base.checked import (
     refusing_in_one_line,
 )
 from ldtrefl.base.errors import InputError, printable, unknown_name
+from ldtrefl.base.notices import warn_once
 from ldtrefl.files.picture_reading import stored_picture
 from ldtrefl.files.stored_picture import StoredPicture
 from ldtrefl.scene import shapes
@@ -57,8 +57,6 @@ NARROWEST = 1e-6
 """The smallest field of view in degrees: at 16,384 pixels a pixel's share is still far above float64's rounding."""
 ROUNDING = 1e-6
 """How far above 1 albedo and mirror may add up without a warning: decimals such as 0.9 and 0.1 are rounded."""
-
-_log = logging.getLogger("ldtrefl")
 
 
 @refusing_in_one_line
@@ -210,11 +208,15 @@ class Object:
             raise ValueError(f"rotate: the axis must not be the zero vector, nor shorter than {SMALLEST:g}")
         if (excess := self.material.excess) is not None:
             total, channel = excess
-            called = self.name or self.shape or (self.mesh if isinstance(self.mesh, str) else "without a name")
-            _warn_once(
-                f"object '{printable(called)}': material.albedo and material.mirror add up to {total:.3g} in "
+            warn_once(
+                f"object '{self.called}': material.albedo and material.mirror add up to {total:.3g} in "
                 f"{channel}: above 1 it gives back more light than falls on it"
             )
+
+    @property
+    def called(self) -> str:
+        """What a line to the user calls the object."""
+        return printable(self.name or self.shape or (self.mesh if isinstance(self.mesh, str) else "without a name"))
 
     @functools.cached_property
     def geometry(self) -> Mesh:
@@ -265,12 +267,6 @@ def _share_geometries(objects: tuple[Object, ...]) -> None:
                 entry.share_geometry(made[source])
             else:
                 made[source] = entry.geometry
-
-
-@functools.lru_cache(maxsize=1024)
-def _warn_once(line: str) -> None:
-    """Log a warning once, although an object is built anew, and so checked, whenever it is moved."""
-    _log.warning("%s", line)
 
 
 @refusing_in_one_line

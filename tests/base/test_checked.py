@@ -9,6 +9,7 @@ import pytest
 
 import ldtrefl
 from ldtrefl import Camera, Environment, InputError, Light, Lighting, Material, Object, Reflection, Scene
+from ldtrefl.base.notices import warn_once
 from ldtrefl.scene import description
 
 CAMERA = Camera(eye=(0, -5, 1), look_at=(0, 0, 0), width=8, height=6)
@@ -96,7 +97,7 @@ def test_albedo_that_nobody_stated() -> None:
 
 
 def test_more_light_than_falls_on_it_is_said_once(caplog: pytest.LogCaptureFixture) -> None:
-    description._warn_once.cache_clear()
+    warn_once.cache_clear()
     with caplog.at_level(logging.WARNING, "ldtrefl"):
         bright = Object(name="lamp [x]", shape="sphere", material=Material(albedo=(0.1, 0.8, 0.1), mirror=0.5))
         dataclasses.replace(bright, scale=2.0)

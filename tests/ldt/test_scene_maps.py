@@ -1,14 +1,17 @@
 """The maps of a scene: peeled when they are first needed, kept by resolution, and bound as a frame chooses them."""
 
 import dataclasses
+import logging
 
 import pytest
 
 import ldtrefl
+from ldtrefl.base.notices import warn_once
 from ldtrefl.device import launch
 from ldtrefl.device.stats import Stats
 from ldtrefl.ldt.options import DEFAULT_RESOLUTION, Quality
 from ldtrefl.ldt.scene_maps import RESOLUTIONS_KEPT, MapKey, MapOptions, SceneMaps
+from ldtrefl.scene import shapes
 from ldtrefl.world.device_scene import DeviceScene
 
 OPTIONS = MapOptions(search="exact", quality="balanced", linear_steps="texel", binary_steps=8, resolution=64)
@@ -105,3 +108,29 @@ def test_an_unusual_resolution_is_not_the_usual_one(scene: DeviceScene) -> None:
     maps.chosen = {mesh: 32}
     maps.bound(scene, {0}, Stats())
     assert not maps.has_usual_maps(scene, {0}) and maps.meshes_without_maps(scene) == 2
+
+
+def test_the_papers_search_says_once_which_objects_are_open(caplog: pytest.LogCaptureFixture) -> None:
+    """Of two objects with the same mesh the first is named; the default search says nothing."""
+    warn_once.cache_clear()
+    bowl = ldtrefl.Object(name="a bowl", shape="bowl", params={"closed": False, "segments": [12, 4]})
+    ball = shapes.make("sphere", {"segments": [12, 6]})
+    turned = ball.faces.copy()
+    turned[7] = turned[7][::-1]
+    objects = (
+        ldtrefl.Object(name="a ball", mesh=ball),
+        bowl,
+        dataclasses.replace(bowl, name="another bowl"),
+        ldtrefl.Object(name="a ball, turned", mesh=ldtrefl.Mesh(ball.vertices, turned)),
+    )
+    camera = ldtrefl.Camera(eye=(0, -5, 0), look_at=(0, 0, 0), width=4, height=4)
+    scene = DeviceScene(ldtrefl.Scene(camera=camera, objects=objects), launch.resolve_device(None))
+    said: list[list[str]] = []
+    with caplog.at_level(logging.WARNING, "ldtrefl"):
+        for search, times in (("exact", 1), ("linear", 2)):
+            for resolution in (32, 64)[:times]:
+                maps = SceneMaps(dataclasses.replace(OPTIONS, search=search, resolution=resolution))
+                maps.bound(scene, range(4), Stats())
+                said.append([record.getMessage().partition(":")[0] for record in caplog.records])
+    expected = [f"object '{name}' is open, or wound both ways" for name in ("a bowl", "a ball, turned")]
+    assert said == [[], expected, expected]
