@@ -1,4 +1,4 @@
-"""Case 21: any mesh as a chrome statue, and before mirrors: the maps' pictures against the ray caster's.
+"""Case 22: any mesh as a chrome statue, and before mirrors: the maps' pictures against the ray caster's.
 
 Real meshes are those of LDTREFL_MESH_PATH, which are left out where they are missing. The others are open,
 inconsistent, overlapping or no surface at all.
@@ -23,7 +23,7 @@ from .inputs import moved
 from .outcomes import TEXELS, Outcome
 from .pictures import not_finite
 
-NAME = "21 chrome"
+NAME = "22 chrome"
 LEAST_SSIM = 0.999
 HELD = {
     # Where two triangles with other normals lie in one place, either may be met.

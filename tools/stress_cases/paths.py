@@ -157,9 +157,11 @@ def paths_of(scene: ldtrefl.Scene, bounces: int) -> Paths:
     o, d = camera_rays(camera)
     d = d / np.linalg.norm(d, axis=1, keepdims=True)
     emission, mirror = (np.array([getattr(e.material, name) for e in scene.objects]) for name in ("emission", "mirror"))
-    count = len(o)
-    radiance, weight, seen_in = np.zeros((count, 3)), np.ones((count, 3)), np.ones((count, 3))
-    paths, left, ends = np.arange(count), np.full(count, -1), []
+    count, ends = len(o), []
+    radiance, seen_in = np.zeros((count, 3)), np.ones((count, 3))
+    weight: np.ndarray = np.ones((count, 3))
+    paths: np.ndarray = np.arange(count)
+    left = np.full(count, -1)
     for bounce in range(bounces + 1):
         if not len(paths):
             break

@@ -68,10 +68,10 @@ def surroundings(scale: float = 8.0) -> ldtrefl.Object:
 
 def reflected_hits(scene: ldtrefl.Scene) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(h, w) arrays: object seen, distance of the reflected ray's hit, and the object hit, by :func:`paths_of`."""
-    seen, reflected = (*paths_of(scene, 1).ends, None)[:2]
-    if reflected is None:  # no mirror is seen
+    seen, *reflected = paths_of(scene, 1).ends
+    if not reflected:  # no mirror is seen
         return seen.object, np.full(seen.object.shape, np.inf), np.full(seen.object.shape, -1)
-    return seen.object, reflected.distance, reflected.object
+    return seen.object, reflected[0].distance, reflected[0].object
 
 
 @dataclass(frozen=True)
