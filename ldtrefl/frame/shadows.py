@@ -6,7 +6,9 @@ from typing import Any
 import warp as wp
 
 from ldtrefl.device import launch
+from ldtrefl.frame.shadow_terminator import rise_to_smooth
 from ldtrefl.geometry.sphere import sphere_entry
+from ldtrefl.geometry.vectors import as_double
 from ldtrefl.shading.direct_light import make_direct_radiance
 from ldtrefl.shading.surface import Surface
 from ldtrefl.tracing.nothing import NOTHING
@@ -22,6 +24,7 @@ class ShadowRay:
 
     query: Query
     outwards: wp.vec3  # as ``Tracer.occluded`` takes it
+    rise: wp.vec3  # the way up from the query's origin to where the ray starts; 0 for most
 
 
 @wp.func
@@ -36,6 +39,8 @@ def shadow_ray(record: ObjectRecord, surface: Surface, towards: wp.vec3, distanc
     if is_own:
         shadow.query.origin = start_above_own(record, surface.triangle, ray.origin, outwards)
         shadow.outwards = outwards
+        if record.smooth != 0 and wp.dot(ray.direction, outwards) < 0.0:
+            shadow.rise = rise_to_smooth(record, surface.triangle, shadow.query.origin, outwards)
     else:
         shadow.query.origin = start_above(ray.origin, outwards)
     return shadow
@@ -45,6 +50,20 @@ def shadow_ray(record: ObjectRecord, surface: Surface, towards: wp.vec3, distanc
 def direct_radiance_of(tracer: Tracer) -> Callable[..., wp.vec3]:
     """``direct_radiance`` with this tracer's shadows."""
     is_occluded = tracer.occluded
+
+    @wp.func
+    def is_in_the_way(views: Any, k: int, shadow: ShadowRay) -> bool:
+        query = shadow.query
+        height = wp.length(shadow.rise)
+        if height > 0.0:
+            # The way up must be free, too: else light would leak through what touches the surface.
+            query.direction = shadow.rise / height
+            query.t_max = height
+            if is_occluded(views, k, query, shadow.outwards):
+                return True
+            query = shadow.query
+            query.origin = query.origin + as_double(shadow.rise)
+        return is_occluded(views, k, query, shadow.outwards)
 
     @wp.func
     def is_lit(
@@ -71,7 +90,7 @@ def direct_radiance_of(tracer: Tracer) -> Callable[..., wp.vec3]:
                     else:
                         k = child.first
                         shadow = shadow_ray(objects[k], surface, towards, distance, k == surface.object)
-                        if is_occluded(views, k, shadow.query, shadow.outwards):
+                        if is_in_the_way(views, k, shadow):
                             return False
         return True
 
