@@ -12,14 +12,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
 import warp as wp
 
 from ldtrefl.frame.camera_shading import Shaded
+from ldtrefl.frame.drawn_objects import DrawnObjects
 from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.reflected_light import ReflectedLight
 from ldtrefl.frame.visibility import draw_gbuffer, resolved
-from ldtrefl.frame.zbuffer import Drawing
+from ldtrefl.frame.zbuffer import CornerRoom, Drawing
 from ldtrefl.scene.description import Camera
+from ldtrefl.world.camera import whole_image
 from ldtrefl.world.device_scene import DeviceScene
 
 
@@ -105,23 +108,23 @@ class FrameHistory:
 
     def gbuffer(self, scene: DeviceScene, camera: Camera) -> GBuffer:
         """Draw what ``camera`` sees of a scene. The last frame is dropped first, so that its memory is used again."""
-        everything = frozenset(range(len(scene.objects)))
         moved = self._moved(scene, camera)
         if self._parts is not None:
             self._spare_radiance = self._parts.shaded.radiance
         self._parts = None
-        if moved is None or moved == everything:
+        if moved is None or len(moved) == len(scene.objects):
             self._still = None
             return draw_gbuffer(scene, camera)
         still = self._still
         moved_since_drawn = None if still is None else still.view.moved(scene, camera)
         if still is None or moved_since_drawn is None or not moved_since_drawn <= still.moving:
-            drawing = Drawing.empty(scene, camera)
-            drawing.add(scene, camera, sorted(everything - moved))
+            drawing = Drawing(camera, whole_image(camera), CornerRoom.of(scene))
+            stand = np.delete(np.arange(len(scene.objects)), list(moved))
+            drawing.draw(scene, DrawnObjects.of(scene, camera, stand))
             still = self._still = _Still(_View(scene, camera), drawing, moved)
         drawing = still.drawing.over()
-        drawing.add(scene, camera, sorted(still.moving))
-        return resolved(drawing, scene, camera)
+        drawing.draw(scene, DrawnObjects.of(scene, camera, np.array(sorted(still.moving))))
+        return resolved(drawing, scene)
 
     def take_spare_radiance(self) -> wp.array | None:
         """An array for the radiance of a frame's pixels, if there is one of an earlier frame that nobody reads."""

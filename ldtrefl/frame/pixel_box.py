@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import warp as wp
 
-from ldtrefl.frame.projection import BEHIND
 from ldtrefl.geometry.perspective_raster import highest, lowest
+
+BEHIND = wp.constant(wp.float64(0.0))
+"""Depth up to which a point is not in front of the camera."""
 
 EDGE_SLACK = wp.constant(wp.float64(1.0e-6))
 """Pixels by which a triangle's box is widened, for centres that lie on its edge up to rounding."""

@@ -1,6 +1,7 @@
 """Drawing a projected triangle into a z-buffer, row by row.
 
-The key of a pixel holds 1 / depth in its upper half and the triangle's number in its lower: the larger key is nearer.
+The key of a pixel holds 1 / depth in its upper half and a number that leads back to the triangle in its lower: the
+larger key is nearer.
 """
 
 from __future__ import annotations
@@ -8,8 +9,8 @@ from __future__ import annotations
 import warp as wp
 
 from ldtrefl.device.atomics import keep_largest
-from ldtrefl.frame.pixel_box import GUARD, PixelBox, first_pixel, last_pixel, pixel_box
-from ldtrefl.frame.projection import BEHIND, homogeneous
+from ldtrefl.frame.pixel_box import BEHIND, GUARD, PixelBox, first_pixel, last_pixel
+from ldtrefl.frame.projection import homogeneous
 from ldtrefl.geometry.perspective_raster import (
     highest,
     homogeneous_triangle,
@@ -19,7 +20,6 @@ from ldtrefl.geometry.perspective_raster import (
     planar_edge,
     planar_nearness,
 )
-from ldtrefl.world.records import ObjectRecord
 
 WIDE = wp.constant(3)
 """Pixels across a triangle's box from which its rows are cut to what lies between its edges; narrower ones are tested
@@ -36,26 +36,50 @@ CUT_SLACK = wp.constant(wp.float64(1.0 / 64.0))
 ``LEAST_RISE``."""
 
 
-@wp.struct
-class ProjectedMesh:
-    """An object's projected triangles, and the band that they are drawn to."""
+ROUNDED_UP = wp.constant(wp.float64(1.0 + 1.0e-9))
+"""Factor by which the nearness of a triangle's nearest corner is enlarged: no point of it is nearer than that."""
 
-    faces: wp.array(dtype=wp.vec3i)
-    corners: wp.array(dtype=wp.vec3d)  # of all objects' vertices
-    first_vertex: int
-    first_triangle: int
+
+@wp.struct
+class Target:
+    """The z-buffer of a band, row by row."""
+
+    keys: wp.array(dtype=wp.int64)  # 0 where nothing is seen
     width: int
     first_row: int
     end_row: int
 
 
+@wp.struct
+class Triangle:
+    """A projected triangle."""
+
+    a: wp.vec3d  # its corners, as ``projection.py`` has them
+    b: wp.vec3d
+    c: wp.vec3d
+    number: int  # that leads back to it
+
+
 @wp.func
-def keep_nearest(mesh: ProjectedMesh, triangle: int, x: int, y: int, nearness: float, keys: wp.array(dtype=wp.int64)):
+def keep_nearest(target: Target, number: int, x: int, y: int, nearness: float):
     """Put a triangle's point into a pixel's key."""
     if nearness > 0.0:
-        number = wp.int64(mesh.first_triangle + triangle)
-        place = (y - mesh.first_row) * mesh.width + x
-        keep_largest(keys, place, (wp.int64(wp.cast(nearness, wp.int32)) << wp.int64(32)) | number)
+        place = (y - target.first_row) * target.width + x
+        upper = wp.int64(wp.cast(nearness, wp.int32)) << wp.int64(32)
+        keep_largest(target.keys, place, upper | wp.int64(number))
+
+
+@wp.func
+def nearness_bits(nearness: wp.float64) -> int:
+    """The bits of 1 / depth as a key's upper half has them, rounded up: larger is nearer."""
+    return wp.cast(wp.float32(nearness * ROUNDED_UP), wp.int32)
+
+
+@wp.func
+def is_behind(target: Target, x: int, y: int, nearest: int) -> bool:
+    """Whether a pixel sees something nearer already than a triangle whose nearest point has these bits."""
+    key = target.keys[(y - target.first_row) * target.width + x]
+    return int(key >> wp.int64(32)) > nearest
 
 
 @wp.func
@@ -77,19 +101,11 @@ def row_bounds(p: wp.vec3d, q: wp.vec3d, area: wp.float64) -> wp.vec4d:
 
 
 @wp.func
-def draw_cut_rows(
-    mesh: ProjectedMesh,
-    triangle: int,
-    a: wp.vec3d,
-    b: wp.vec3d,
-    c: wp.vec3d,
-    box: PixelBox,
-    first_y: int,
-    last_y: int,
-    keys: wp.array(dtype=wp.int64),
-):
+def draw_cut_rows(target: Target, triangle: Triangle, box: PixelBox, first_y: int, last_y: int):
     """Draw a planar triangle's pixels, testing of each row only those between its edges."""
     half = wp.float64(0.5)
+    a, b, c = triangle.a, triangle.b, triangle.c
+    nearest = nearness_bits(highest(a[2], b[2], c[2]))
     area = planar_edge(a, b, c[0], c[1])
     ab, bc, ca = row_bounds(a, b, area), row_bounds(b, c, area), row_bounds(c, a, area)
     begin, end = wp.float64(box.first_x), wp.float64(box.last_x) + wp.float64(1.0)
@@ -101,32 +117,30 @@ def draw_cut_rows(
         x = first_pixel(lowest(highest(low, begin, begin), end, end))
         last_x = last_pixel(highest(lowest(high, end, end), begin, begin))
         while x <= last_x:
-            nearness = planar_nearness(a, b, c, wp.float64(x) + half, at_y)
-            keep_nearest(mesh, triangle, x, y, nearness, keys)
+            if not is_behind(target, x, y, nearest):
+                nearness = planar_nearness(a, b, c, wp.float64(x) + half, at_y)
+                keep_nearest(target, triangle.number, x, y, nearness)
             x += 1
         y += 1
 
 
 @wp.func
-def draw_rows(
-    mesh: ProjectedMesh, triangle: int, box: PixelBox, first_y: int, last_y: int, keys: wp.array(dtype=wp.int64)
-):
+def draw_rows(target: Target, triangle: Triangle, box: PixelBox, first_y: int, last_y: int):
     """Draw a triangle's pixels from row ``first_y`` to ``last_y``."""
-    face = mesh.faces[triangle]
-    a = mesh.corners[mesh.first_vertex + face[0]]
-    b = mesh.corners[mesh.first_vertex + face[1]]
-    c = mesh.corners[mesh.first_vertex + face[2]]
+    a, b, c = triangle.a, triangle.b, triangle.c
     half = wp.float64(0.5)
     if box.planar and box.last_x - box.first_x + 1 >= WIDE:
-        draw_cut_rows(mesh, triangle, a, b, c, box, first_y, last_y, keys)
+        draw_cut_rows(target, triangle, box, first_y, last_y)
     elif box.planar:
+        nearest = nearness_bits(highest(a[2], b[2], c[2]))
         # Not by ``range``, whose loop tests its step's sign each time: most triangles cover a pixel or two.
         y = int(first_y)
         while y <= last_y:
             x = int(box.first_x)
             while x <= box.last_x:
-                nearness = planar_nearness(a, b, c, wp.float64(x) + half, wp.float64(y) + half)
-                keep_nearest(mesh, triangle, x, y, nearness, keys)
+                if not is_behind(target, x, y, nearest):
+                    nearness = planar_nearness(a, b, c, wp.float64(x) + half, wp.float64(y) + half)
+                    keep_nearest(target, triangle.number, x, y, nearness)
                 x += 1
             y += 1
     else:
@@ -135,39 +149,4 @@ def draw_rows(
             for x in range(box.first_x, box.last_x + 1):
                 at = perspective_weights(tri, wp.float64(x) + half, wp.float64(y) + half)
                 if wp.min(at) >= BEHIND and tri.volume != BEHIND:
-                    keep_nearest(mesh, triangle, x, y, inverse_depth(tri, at), keys)
-
-
-@wp.func
-def triangle_box(mesh: ProjectedMesh, triangle: int) -> PixelBox:
-    """:func:`pixel_box` of a triangle."""
-    face = mesh.faces[triangle]
-    return pixel_box(
-        mesh.corners[mesh.first_vertex + face[0]],
-        mesh.corners[mesh.first_vertex + face[1]],
-        mesh.corners[mesh.first_vertex + face[2]],
-        mesh.width,
-        mesh.first_row,
-        mesh.end_row,
-    )
-
-
-@wp.func
-def object_triangles(
-    objects: wp.array(dtype=ObjectRecord),
-    index: int,
-    corners: wp.array(dtype=wp.vec3d),
-    width: int,
-    first_row: int,
-    end_row: int,
-) -> ProjectedMesh:
-    """The projected triangles of an object."""
-    mesh = ProjectedMesh()
-    mesh.faces = objects[index].faces
-    mesh.corners = corners
-    mesh.first_vertex = objects[index].first_vertex
-    mesh.first_triangle = objects[index].first_triangle
-    mesh.width = width
-    mesh.first_row = first_row
-    mesh.end_row = end_row
-    return mesh
+                    keep_nearest(target, triangle.number, x, y, inverse_depth(tri, at))

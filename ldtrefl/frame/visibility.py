@@ -8,21 +8,95 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
 import warp as wp
 
 from ldtrefl.device import launch
+from ldtrefl.frame.drawn_objects import DrawnObjects
 from ldtrefl.frame.gbuffer import GBuffer, GBufferView
+from ldtrefl.frame.pixel_box import BEHIND
 from ldtrefl.frame.pixel_order import BLOCK
-from ldtrefl.frame.projection import homogeneous
-from ldtrefl.frame.zbuffer import Drawing, empty_corners, object_of, project
-from ldtrefl.geometry.perspective_raster import homogeneous_triangle, perspective_weights
+from ldtrefl.frame.projection import DrawnObject, corner_of, homogeneous
+from ldtrefl.frame.zbuffer import CornerRoom, Drawing
+from ldtrefl.geometry.perspective_raster import (
+    HomogeneousTriangle,
+    homogeneous_triangle,
+    inverse_depth,
+    perspective_weights,
+)
 from ldtrefl.scene.description import Camera
-from ldtrefl.world.camera import Band, camera_view
+from ldtrefl.world.camera import Band, camera_view, whole_image
 from ldtrefl.world.device_scene import DeviceScene
 from ldtrefl.world.records import ObjectRecord
+from ldtrefl.world.triangle_numbers import TriangleNumbers, first_triangle_of, object_of
 
 BAND_PIXELS = 1 << 20
 """Pixels of a band, about: enough rays for all threads, and their arrays take less than 0.2 GB."""
+
+
+PIXELS_IN_A_ROW = 16
+"""Pixels that one thread of a CPU finds: neighbours often see the same triangle, which is then projected once."""
+
+
+@wp.struct
+class Resolved:
+    """What pixels see."""
+
+    object: wp.array(dtype=wp.int32)
+    triangle: wp.array(dtype=wp.int32)
+    barycentrics: wp.array(dtype=wp.vec2)
+    reflector: wp.array(dtype=wp.uint8)
+
+
+@wp.func
+def number_in(key: wp.int64) -> int:
+    """The number that leads back to a triangle."""
+    return int(key & wp.int64(0x7FFFFFFF))
+
+
+@wp.func
+def pixel_of(i: int, width: int, first_row: int) -> wp.vec2d:
+    """The centre of pixel ``i`` of a band, in the whole image."""
+    half = wp.float64(0.5)
+    return wp.vec2d(wp.float64(i % width) + half, wp.float64(first_row + i / width) + half)
+
+
+@wp.func
+def triangle_seen(
+    drawn: DrawnObject, objects: wp.array(dtype=ObjectRecord), corners: wp.array(dtype=wp.vec3d), triangle: int
+) -> HomogeneousTriangle:
+    """A triangle of an object that is drawn."""
+    face = objects[drawn.object].faces[triangle]
+    return homogeneous_triangle(
+        homogeneous(corner_of(drawn, objects, corners, face[0])),
+        homogeneous(corner_of(drawn, objects, corners, face[1])),
+        homogeneous(corner_of(drawn, objects, corners, face[2])),
+    )
+
+
+@wp.func
+def of_its_group(
+    drawn: DrawnObject,
+    objects: wp.array(dtype=ObjectRecord),
+    corners: wp.array(dtype=wp.vec3d),
+    first_triangle: int,
+    count: int,
+    pixel: wp.vec2d,
+    key: wp.int64,
+) -> int:
+    """The triangle of a group that a pixel of this key sees; the last one of several."""
+    nearness = wp.cast(int(key >> wp.int64(32)), float)
+    found, best = int(first_triangle), float(wp.inf)
+    for triangle in range(first_triangle, wp.min(first_triangle + count, objects[drawn.object].faces.shape[0])):
+        tri = triangle_seen(drawn, objects, corners, triangle)
+        at = perspective_weights(tri, pixel[0], pixel[1])
+        if wp.min(at) >= BEHIND and tri.volume != BEHIND:
+            # The same arithmetic drew it, but for triangles near the camera's plane, or by another rounding.
+            off = wp.abs(inverse_depth(tri, at) - nearness)
+            if off <= best:
+                best = off
+                found = triangle
+    return found
 
 
 @launch.kernel
@@ -31,73 +105,89 @@ def resolve_pixels(
     # In:
     keys: wp.array(dtype=wp.int64),
     objects: wp.array(dtype=ObjectRecord),
+    drawn: wp.array(dtype=DrawnObject),
+    place_of: wp.array(dtype=wp.int32),  # of each object of the scene among those drawn
+    numbers: TriangleNumbers,
     corners: wp.array(dtype=wp.vec3d),
     width: int,
     first_row: int,
-    # Out:
-    object_out: wp.array(dtype=wp.int32),
-    triangle_out: wp.array(dtype=wp.int32),
-    barycentrics_out: wp.array(dtype=wp.vec2),
-    # Out, 0 before:
-    reflector_out: wp.array(dtype=wp.uint8),
+    run: int,
+    # Out, the reflectors 0 before:
+    resolved: Resolved,
 ):
-    """Find which point of which triangle one pixel sees, from its key."""
-    i = first + wp.tid()
-    if keys[i] == wp.int64(0):
-        object_out[i] = -1
-        triangle_out[i] = -1
-        barycentrics_out[i] = wp.vec2(0.0, 0.0)
-        return
-    number = int(keys[i] & wp.int64(0x7FFFFFFF))
-    index = object_of(objects, number)
-    triangle = number - objects[index].first_triangle
-    face = objects[index].faces[triangle]
-    first_vertex = objects[index].first_vertex
-    tri = homogeneous_triangle(
-        homogeneous(corners[first_vertex + face[0]]),
-        homogeneous(corners[first_vertex + face[1]]),
-        homogeneous(corners[first_vertex + face[2]]),
-    )
-    x, y = wp.float64(i % width) + wp.float64(0.5), wp.float64(first_row + i / width) + wp.float64(0.5)
-    at = perspective_weights(tri, x, y)
-    total = at[0] + at[1] + at[2]
-    object_out[i] = index
-    triangle_out[i] = triangle
-    barycentrics_out[i] = wp.vec2(float(at[1] / total), float(at[2] / total))
-    if wp.max(objects[index].mirror) > 0.0:
-        reflector_out[i] = wp.uint8(1)
+    """Find which point of which triangle each pixel of a run sees, from its key."""
+    begin = run * (first + wp.tid())
+    end = wp.min(begin + run, keys.shape[0])
+    i = int(begin)
+    while i < end:
+        if keys[i] == wp.int64(0):
+            resolved.object[i] = -1
+            resolved.triangle[i] = -1
+            resolved.barycentrics[i] = wp.vec2(0.0, 0.0)
+            i += 1
+        else:
+            number = number_in(keys[i])
+            index = object_of(numbers, number)
+            one = drawn[place_of[index]]
+            triangle = first_triangle_of(numbers, index, number)
+            if numbers.shift > 0:
+                pixel = pixel_of(i, width, first_row)
+                triangle = of_its_group(one, objects, corners, triangle, 1 << numbers.shift, pixel, keys[i])
+            tri = triangle_seen(one, objects, corners, triangle)
+            is_mirror = wp.where(wp.max(objects[index].mirror) > 0.0, wp.uint8(1), wp.uint8(0))
+
+            # Pixels in a row often see the same triangle.
+            more = bool(True)
+            while more:
+                pixel = pixel_of(i, width, first_row)
+                at = perspective_weights(tri, pixel[0], pixel[1])
+                total = at[0] + at[1] + at[2]
+                resolved.object[i] = index
+                resolved.triangle[i] = triangle
+                resolved.barycentrics[i] = wp.vec2(float(at[1] / total), float(at[2] / total))
+                resolved.reflector[i] = is_mirror
+                i += 1
+                more = i < end and numbers.shift == 0
+                if more:
+                    more = number_in(keys[i]) == number and keys[i] != wp.int64(0)
 
 
-def resolved(drawing: Drawing, scene: DeviceScene, camera: Camera) -> GBuffer:
+def resolved(drawing: Drawing, scene: DeviceScene) -> GBuffer:
     """The G-buffer of what was drawn: which point of which triangle each pixel sees."""
-    device, pixels = scene.device, camera.width * drawing.band.rows
-    view = GBufferView()
+    device, camera, pixels = scene.device, drawing.camera, drawing.keys.shape[0]
+    view, out = GBufferView(), Resolved()
     view.object, view.triangle = (wp.empty(pixels, dtype=wp.int32, device=device) for _ in range(2))
     view.barycentrics = wp.empty(pixels, dtype=wp.vec2, device=device)
     view.reflector = wp.zeros(pixels, dtype=wp.uint8, device=device)
     view.camera = camera_view(camera, scene.device_from_world, drawing.band)
-    inputs = [drawing.keys, scene.records, drawing.corners, camera.width, drawing.band.first_row]
-    outputs = [view.object, view.triangle, view.barycentrics, view.reflector]
-    launch.launch(resolve_pixels, pixels, [*inputs, *outputs], device)
+    out.object, out.triangle, out.barycentrics = view.object, view.triangle, view.barycentrics
+    out.reflector = view.reflector
+    drawn = DrawnObjects.joined(drawing.drawn)
+    place_of = np.full(len(scene.objects), -1, np.int32)
+    place_of[drawn.numbers] = np.arange(len(drawn.numbers))
+    places = wp.array(place_of, dtype=wp.int32, device=device)
+    run = PIXELS_IN_A_ROW if device.is_cpu else 1
+    known = [scene.records, drawn.on_device(drawing.room.first, device), places, scene.triangle_numbers]
+    inputs = [drawing.keys, *known, drawing.room.corners, camera.width, drawing.band.first_row, run, out]
+    launch.launch(resolve_pixels, -(-pixels // run), inputs, device)
     return GBuffer(scene, camera, view, drawing.band)
 
 
 def draw_gbuffer(scene: DeviceScene, camera: Camera) -> GBuffer:
     """Draw what ``camera`` sees of the scene."""
-    drawing = Drawing.empty(scene, camera)
-    drawing.add(scene, camera, range(len(scene.objects)))
-    return resolved(drawing, scene, camera)
+    drawing = Drawing(camera, whole_image(camera), CornerRoom.of(scene))
+    drawing.draw(scene, DrawnObjects.of(scene, camera, np.arange(len(scene.objects))))
+    return resolved(drawing, scene)
 
 
 def draw_in_bands(scene: DeviceScene, camera: Camera, *, without: int = -1) -> Iterator[GBuffer]:
     """Draw what ``camera`` sees of the scene, band by band from the top; object number ``without`` is left out."""
-    everything = [number for number in range(len(scene.objects)) if number != without]
+    everything = np.arange(len(scene.objects))
+    objects = DrawnObjects.of(scene, camera, everything[everything != without])
     rows = max(1, BAND_PIXELS // camera.width // BLOCK) * BLOCK
-    # The corners are the whole image's, and found once.
-    corners = empty_corners(scene)
-    project(scene, camera, everything, corners)
+    room = CornerRoom.of(scene)
     for row in range(0, camera.height, rows):
-        band = Band(row, min(rows, camera.height - row))
-        drawing = Drawing.empty(scene, camera, band, corners)
-        drawing.draw(scene, camera, everything)
-        yield resolved(drawing, scene, camera)
+        drawing = Drawing(camera, Band(row, min(rows, camera.height - row)), room)
+        # Corners are the whole image's: those that are kept are found once.
+        drawing.draw(scene, objects, are_projected=row > 0 and room.keeps)
+        yield resolved(drawing, scene)

@@ -1,156 +1,147 @@
 """The z-buffer: which triangle is nearest in each pixel, and how near.
 
-All objects are drawn by the same three launches, however many there are: their vertices and triangles are handed out in
-chunks. The triangles are those of ``geometry/perspective_raster.py``.
+Objects are drawn together by the same three launches, however many there are: their vertices and triangles are handed
+out in chunks. As many are drawn together as there is room for their corners. The triangles are those of
+``geometry/perspective_raster.py``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 import warp as wp
 
 from ldtrefl.device import launch
-from ldtrefl.device.atomics import take_place
 from ldtrefl.device.bins import CHUNK
-from ldtrefl.frame.projection import Chunks, chunks_of, project_vertices
-from ldtrefl.frame.triangle_rows import draw_rows, object_triangles, triangle_box
+from ldtrefl.frame.drawn_objects import DrawnObjects
+from ldtrefl.frame.large_triangles import LargeTriangles, draw_or_set_aside, draw_those_set_aside, none_set_aside
+from ldtrefl.frame.projection import Chunks, DrawnObject, chunks_of, project_vertices
+from ldtrefl.frame.triangle_rows import Target, Triangle
 from ldtrefl.scene.description import Camera
-from ldtrefl.world.camera import Band, pixels_from_world, whole_image
+from ldtrefl.world.camera import Band
 from ldtrefl.world.device_scene import DeviceScene
 from ldtrefl.world.records import ObjectRecord
+from ldtrefl.world.triangle_numbers import TriangleNumbers, number_of
 
-LARGE_BOX = wp.constant(4096)
-"""Pixels in a triangle's box from which it is drawn in strips of rows, so that all threads share it."""
+CORNERS_KEPT = 1 << 22
+"""Corners that are kept till it is known what pixels see: 96 MiB. Where all objects together have more, they are found
+again."""
 
-STRIP = wp.constant(8)
-"""Rows of such a strip."""
-
-
-@wp.func
-def object_of(objects: wp.array(dtype=ObjectRecord), triangle: int) -> int:
-    """The object that holds the triangle of this number, by bisection."""
-    low = int(0)
-    high = objects.shape[0]
-    while high - low > 1:
-        middle = (low + high) / 2
-        if objects[middle].first_triangle <= triangle:
-            low = middle
-        else:
-            high = middle
-    return low
+CORNERS_TOGETHER = 1 << 18
+"""Corners of objects that are drawn together where corners are not kept: 6 MiB, which caches hold. A single object may
+have more."""
 
 
 @launch.kernel
-def draw_small_triangles(
+def draw_triangles(
     first: int,
     # In:
     chunks: Chunks,
     objects: wp.array(dtype=ObjectRecord),
+    drawn: wp.array(dtype=DrawnObject),
+    numbers: TriangleNumbers,
     corners: wp.array(dtype=wp.vec3d),
-    width: int,
-    first_row: int,
-    end_row: int,
-    # Out: a pixel's key holds 1 / depth in its upper half, the triangle in its lower
-    key_out: wp.array(dtype=wp.int64),
-    # Out: how many triangles are too large, and their numbers among all objects' in any order
-    count_out: wp.array(dtype=wp.int32),
-    list_out: wp.array(dtype=wp.int32),
-):
-    """Draw the triangles of one chunk, but list those whose boxes are large."""
-    chunk = first + wp.tid()
-    mesh = object_triangles(objects, chunks.object[chunk], corners, width, first_row, end_row)
-    begin = chunks.begin[chunk]
-    for triangle in range(begin, wp.min(begin + CHUNK, mesh.faces.shape[0])):
-        box = triangle_box(mesh, triangle)
-        # Most triangles of a dense mesh lie between pixel centres and end here.
-        if box.first_x <= box.last_x and box.first_y <= box.last_y:
-            if (box.last_x - box.first_x + 1) * (box.last_y - box.first_y + 1) < LARGE_BOX:
-                draw_rows(mesh, triangle, box, box.first_y, box.last_y, key_out)
-            else:
-                list_out[take_place(count_out)] = mesh.first_triangle + triangle
-
-
-@launch.kernel
-def draw_large_triangles(
-    first: int,
-    # In:
-    large: wp.array(dtype=wp.int32),
-    objects: wp.array(dtype=ObjectRecord),
-    corners: wp.array(dtype=wp.vec3d),
-    width: int,
-    first_row: int,
-    end_row: int,
     # Out:
-    key_out: wp.array(dtype=wp.int64),
+    target: Target,
+    large: LargeTriangles,
 ):
-    """Draw one strip of rows of a large triangle."""
-    i = first + wp.tid()
-    strips = (end_row - first_row + STRIP - 1) / STRIP
-    number = large[i / strips]
-    index = object_of(objects, number)
-    mesh = object_triangles(objects, index, corners, width, first_row, end_row)
-    triangle = number - mesh.first_triangle
-    box = triangle_box(mesh, triangle)
-    strip = first_row + STRIP * (i % strips)
-    draw_rows(mesh, triangle, box, wp.max(box.first_y, strip), wp.min(box.last_y, strip + STRIP - 1), key_out)
-
-
-def empty_corners(scene: DeviceScene) -> wp.array:
-    """(all objects' vertices,) vec3d, not filled yet."""
-    return wp.empty(int(scene.vertex_counts.sum()), dtype=wp.vec3d, device=scene.device)
-
-
-def project(scene: DeviceScene, camera: Camera, numbers: Sequence[int], corners: wp.array) -> None:
-    """Find the corners, in pixels of the whole image, of the objects of these numbers."""
-    if not len(numbers):
-        return
-    listed, device = np.array(numbers), scene.device
-    rows = (pixels_from_world(camera) @ scene.world_from_unit[listed]).reshape(-1, 4)
-    chunks, count = chunks_of(listed, scene.vertex_counts[listed], device)
-    inputs = [chunks, scene.records, wp.array(rows, dtype=wp.vec4d, device=device), corners]
-    launch.launch(project_vertices, count, inputs, device)
+    """Draw the triangles of one chunk, but set those aside whose boxes are large."""
+    chunk = first + wp.tid()
+    place = chunks.place[chunk]
+    index = drawn[place].object
+    first_corner = drawn[place].first_corner
+    faces = objects[index].faces
+    i = int(chunks.begin[chunk])
+    end = wp.min(i + CHUNK, faces.shape[0])
+    while i < end:
+        triangle = Triangle()
+        triangle.a = corners[first_corner + faces[i][0]]
+        triangle.b = corners[first_corner + faces[i][1]]
+        triangle.c = corners[first_corner + faces[i][2]]
+        triangle.number = number_of(numbers, index, i)
+        draw_or_set_aside(target, triangle, place, i, large)
+        i += 1
 
 
 @dataclass(frozen=True, eq=False)
-class Drawing:
-    """A z-buffer of a band, and the corners of what is drawn in it."""
+class CornerRoom:
+    """Room for the corners of objects that are drawn together."""
 
-    keys: wp.array
-    """(h * w,) int64: nearness of what a pixel sees, then its triangle; 0 where nothing is seen."""
     corners: wp.array
-    """(all objects' vertices,) vec3d in pixels of the whole image."""
-    band: Band
+    """(m,) vec3d: all objects' if they are kept, else none."""
+    first: np.ndarray
+    """(objects,) int64, the place of each object's vertex 0; -1 if corners are not kept."""
 
     @classmethod
-    def empty(
-        cls, scene: DeviceScene, camera: Camera, band: Band | None = None, corners: wp.array | None = None
-    ) -> Drawing:
-        """An empty z-buffer of a band, or of the whole image; with corners that are known, or with room for them."""
-        band = band or whole_image(camera)
-        keys = wp.zeros(camera.width * band.rows, dtype=wp.int64, device=scene.device)
-        return cls(keys, empty_corners(scene) if corners is None else corners, band)
+    def of(cls, scene: DeviceScene) -> CornerRoom:
+        """Room for all corners of a scene, or none if there are too many to be kept."""
+        total = int(scene.vertex_counts.sum())
+        first = np.cumsum(scene.vertex_counts) - scene.vertex_counts
+        if total > CORNERS_KEPT:
+            total, first = 0, np.full_like(first, -1)
+        return cls(wp.empty(total, dtype=wp.vec3d, device=scene.device), first)
+
+    @property
+    def keeps(self) -> bool:
+        """Whether corners are kept."""
+        return len(self.first) == 0 or self.first[0] >= 0
+
+
+class Drawing:
+    """A z-buffer of a band of an image, and what was drawn in it."""
+
+    def __init__(self, camera: Camera, band: Band, room: CornerRoom) -> None:
+        """Empty: nothing is seen."""
+        self.camera = camera
+        self.band = band
+        self.room = room
+        self.keys = wp.zeros(camera.width * band.rows, dtype=wp.int64, device=room.corners.device)
+        """(h * w,) int64: nearness of what a pixel sees, then its triangle's number; 0 where nothing is seen."""
+        self.drawn: list[DrawnObjects] = []
+        """What was drawn."""
 
     def over(self) -> Drawing:
         """A copy to draw other objects over."""
-        return Drawing(wp.clone(self.keys), self.corners, self.band)
+        copy = Drawing.__new__(Drawing)
+        copy.camera, copy.band, copy.room = self.camera, self.band, self.room
+        copy.keys, copy.drawn = wp.clone(self.keys), list(self.drawn)
+        return copy
 
-    def add(self, scene: DeviceScene, camera: Camera, numbers: Iterable[int]) -> None:
-        """Draw the objects of these numbers."""
-        listed = list(numbers)
-        project(scene, camera, listed, self.corners)
-        self.draw(scene, camera, listed)
+    def draw(self, scene: DeviceScene, objects: DrawnObjects, *, are_projected: bool = False) -> None:
+        """Draw objects; ``are_projected`` says that their corners are in the room."""
+        self.drawn.append(objects)
+        if self.room.keeps:
+            self._draw(scene, objects, self.room, are_projected=are_projected)
+            return
+        for part, counts in _parts(scene.vertex_counts[objects.numbers]):
+            first = np.empty(len(scene.objects), np.int64)
+            first[objects.numbers[part]] = np.cumsum(counts) - counts
+            room = CornerRoom(wp.empty(int(counts.sum()), dtype=wp.vec3d, device=scene.device), first)
+            self._draw(scene, objects.some(part), room, are_projected=False)
 
-    def draw(self, scene: DeviceScene, camera: Camera, numbers: Sequence[int]) -> None:
-        """Draw the objects of these numbers, whose corners are known."""
-        device, drawn = scene.device, np.array(numbers, np.int64)
-        counts = scene.triangle_counts[drawn]
-        chunks, count = chunks_of(drawn, counts, device)
-        large = wp.zeros(1, dtype=wp.int32, device=device)
-        listed = wp.empty(int(counts.sum()), dtype=wp.int32, device=device)
-        target = [scene.records, self.corners, camera.width, self.band.first_row, self.band.first_row + self.band.rows]
-        launch.launch(draw_small_triangles, count, [chunks, *target, self.keys, large, listed], device)
-        strips = int(large.numpy()[0]) * -(-self.band.rows // int(STRIP))
-        launch.launch(draw_large_triangles, strips, [listed, *target, self.keys], device)
+    def _draw(self, scene: DeviceScene, objects: DrawnObjects, room: CornerRoom, *, are_projected: bool) -> None:
+        """Draw objects for whose corners there is room."""
+        device, drawn = scene.device, objects.on_device(room.first, scene.device)
+        if not are_projected:
+            chunks, count = chunks_of(scene.vertex_counts[objects.numbers], device)
+            launch.launch(project_vertices, count, [chunks, scene.records, drawn, room.corners], device)
+        target = Target()
+        target.keys, target.width = self.keys, self.camera.width
+        target.first_row, target.end_row = self.band.first_row, self.band.first_row + self.band.rows
+        chunks, count = chunks_of(scene.triangle_counts[objects.numbers], device)
+        large, numbers = none_set_aside(device), scene.triangle_numbers
+        inputs = [chunks, scene.records, drawn, numbers, room.corners, target, large]
+        launch.launch(draw_triangles, count, inputs, device)
+        draw_those_set_aside(large, scene.records, drawn, numbers, room.corners, target)
+
+
+def _parts(counts: np.ndarray) -> Iterator[tuple[slice, np.ndarray]]:
+    """Slices of objects that are drawn together, with the number of vertices of each object."""
+    ends, begin = np.cumsum(counts), 0
+    while begin < len(counts):
+        before = ends[begin] - counts[begin]
+        end = max(begin + 1, int(np.searchsorted(ends, before + CORNERS_TOGETHER, side="right")))
+        yield slice(begin, end), counts[begin:end]
+        begin = end

@@ -27,9 +27,7 @@ from ldtrefl.world.lighting import lighting_of
 from ldtrefl.world.object_records import object_records, set_places
 from ldtrefl.world.records import LightingRecord, ObjectRecord
 from ldtrefl.world.top_level import TopLevel, order_of, top_level
-
-MOST_NUMBERS = (1 << 31) - 1
-"""The most triangles, and vertices, that all objects may have together: they are numbered by int32."""
+from ldtrefl.world.triangle_numbers import MOST_NUMBERS, TriangleNumbers, numbered
 
 
 class DeviceScene:
@@ -44,7 +42,7 @@ class DeviceScene:
         skip_attributes: leave out normals and texture coordinates that shading does not read.
 
     Raises:
-        InputError: a mesh, texture or picture cannot be read, or there are too many triangles, vertices or texels.
+        InputError: a mesh, texture or picture cannot be read, or there are too many texels.
     """
 
     def __init__(
@@ -54,7 +52,8 @@ class DeviceScene:
         self.device = device
         self._skip_attributes = skip_attributes
         self._top_order: np.ndarray | None = None if before is None else before._top_order
-        self._decoded = wp.array(linear_of_bytes(), dtype=float, device=device, copy=False)
+        decoded = wp.array(linear_of_bytes(), dtype=float, device=device, copy=False)
+        self._decoded: wp.array = decoded if before is None else before._decoded  # records that are taken over read it
         self.device_from_world = device_space(scene.layout_box)
         if before is not None and before.scene.layout.has_meshes_of(scene.layout):
             self._take_over(before)
@@ -80,9 +79,11 @@ class DeviceScene:
         """Each mesh once: those with equal content are one."""
         self.mesh_of: np.ndarray = np.array([numbers[mesh] for mesh in meshes], np.int64)[layout.mesh_of]
         """(objects,) int64, the number of each object's mesh."""
-        counts = np.array([(len(mesh.faces), len(mesh.vertices)) for mesh in self.meshes], np.int64).reshape(-1, 2)
-        self._firsts = _numbered(counts[self.mesh_of])
-        """(objects + 1, 2) the numbers of each object's triangle 0 and vertex 0 among all objects'; then the totals."""
+        self.triangle_counts = np.array([len(mesh.faces) for mesh in self.meshes], np.int64)[self.mesh_of]
+        """(objects,) int64."""
+        self.vertex_counts = np.array([len(mesh.vertices) for mesh in self.meshes], np.int64)[self.mesh_of]
+        """(objects,) int64."""
+        self.triangle_numbers: TriangleNumbers = numbered(self.triangle_counts, self.device)
         every = np.arange(len(self.mesh_of))
         self.world_from_unit, self.spheres, self._host_records = self._placed(every)
         """(objects, 4, 4) float64; (objects, 4) float64, centre and radius of each bounding sphere in device space;
@@ -96,7 +97,8 @@ class DeviceScene:
 
     def _take_over(self, before: DeviceScene) -> None:
         """Take over all objects but those that have changed. Device space and the meshes are the same."""
-        self.meshes, self.mesh_of, self._firsts = before.meshes, before.mesh_of, before._firsts
+        self.meshes, self.mesh_of, self.triangle_numbers = before.meshes, before.mesh_of, before.triangle_numbers
+        self.triangle_counts, self.vertex_counts = before.triangle_counts, before.vertex_counts
         changed = np.flatnonzero(self._changed_since(before))
         self.world_from_unit, self.spheres = before.world_from_unit.copy(), before.spheres.copy()
         self._host_records, self._stamps = before._host_records.copy(), before._stamps.copy()
@@ -119,23 +121,13 @@ class DeviceScene:
         device_from_unit = self.device_from_world @ world_from_unit
         radii = bounding_radii(self.meshes, mesh_of, device_from_unit)
         records = object_records(sources, self.meshes, mesh_of, self._decoded, skip_attributes=self._skip_attributes)
-        set_places(records, device_from_unit, radii, *self._firsts[numbers].T)
+        set_places(records, device_from_unit, radii)
         return world_from_unit, np.concatenate([device_from_unit[:, :3, 3], radii[:, None]], axis=1), records
 
     @functools.cached_property
     def objects(self) -> DeviceObjects:
         """The objects as the host sees them."""
         return DeviceObjects(self.scene.objects, self.meshes, self.mesh_of, self.world_from_unit, self.spheres)
-
-    @property
-    def triangle_counts(self) -> np.ndarray:
-        """(objects,) int64 triangles of each object."""
-        return np.diff(self._firsts[:, 0])
-
-    @property
-    def vertex_counts(self) -> np.ndarray:
-        """(objects,) int64 vertices of each object."""
-        return np.diff(self._firsts[:, 1])
 
     @functools.cached_property
     def attribute_bytes(self) -> int:
@@ -159,8 +151,14 @@ class DeviceScene:
 
     @functools.cached_property
     def reflector_rows(self) -> tuple[wp.array, int]:
-        """((objects,) int32, the number of a reflector's triangle 0 among all reflectors' triangles; their count)."""
+        """((objects,) int32, the number of a reflector's triangle 0 among all reflectors' triangles; their count).
+
+        Raises:
+            InputError: they are more than can be numbered.
+        """
         firsts = np.concatenate([[0], np.cumsum(np.where(self.is_reflector, self.triangle_counts, 0))])
+        if firsts[-1] > MOST_NUMBERS:
+            raise InputError(f"the mirrors have more than {MOST_NUMBERS} triangles, instances counted in")
         return wp.array(firsts[:-1].astype(np.int32), dtype=wp.int32, device=self.device), int(firsts[-1])
 
     @functools.cached_property
@@ -191,16 +189,3 @@ def _object_from_unit(geometry: DeviceMesh) -> np.ndarray:
     matrix = np.diag([half, half, half, 1.0])
     matrix[:3, 3] = centre
     return matrix
-
-
-def _numbered(counts: np.ndarray) -> np.ndarray:
-    """(objects + 1, 2) int64: for each object the sum of the (objects, 2) counts before it; then the totals.
-
-    Raises:
-        InputError: the triangles, or the vertices, are more than can be numbered.
-    """
-    firsts = np.concatenate([np.zeros((1, 2), np.int64), np.cumsum(counts, axis=0)])
-    for total, what in zip(firsts[-1].tolist(), ("triangles", "vertices"), strict=True):
-        if total > MOST_NUMBERS:
-            raise InputError(f"the objects have more than {MOST_NUMBERS} {what}, instances counted in")
-    return firsts

@@ -61,21 +61,13 @@ def object_records(
     return made
 
 
-def set_places(
-    records: np.ndarray,
-    device_from_unit: np.ndarray,
-    radii: np.ndarray,
-    first_triangle: np.ndarray,
-    first_vertex: np.ndarray,
-) -> None:
+def set_places(records: np.ndarray, device_from_unit: np.ndarray, radii: np.ndarray) -> None:
     """Fill in where objects stand.
 
     Args:
         records: (n,) the records that are filled in.
         device_from_unit: (n, 4, 4) float64.
         radii: (n,) of the bounding spheres, which are about the centres of the meshes' boxes.
-        first_triangle: (n,) number of each object's triangle 0 among all objects' triangles.
-        first_vertex: (n,) number of its vertex 0 among all objects' vertices.
     """
     inverse = np.linalg.inv(device_from_unit)
     linear = inverse[:, :3, :3]
@@ -86,7 +78,6 @@ def set_places(
     records["unit_from_direction"] = np.ldexp(linear, -exponents[:, None, None])
     records["normal_from_unit"] = linear.transpose(0, 2, 1) / largest[:, None, None]
     records["centre"], records["radius"] = device_from_unit[:, :3, 3], radii
-    records["first_triangle"], records["first_vertex"] = first_triangle, first_vertex
 
 
 def _colors(materials: Sequence[Material], name: str) -> np.ndarray:

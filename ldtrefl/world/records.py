@@ -27,8 +27,6 @@ class ObjectRecord:
     normal_from_unit: wp.mat33  # inverse transpose of device_from_unit's linear part
     centre: wp.vec3d  # bounding sphere, device space
     radius: float  # of that sphere, device units
-    first_triangle: int  # number of triangle 0 among all objects' triangles
-    first_vertex: int  # number of vertex 0 among all objects' vertices
     smooth: int  # 1 for interpolated shading normals, 0 for the facets'
     fresnel: int  # 1 for Schlick's approximation
     albedo: wp.vec3

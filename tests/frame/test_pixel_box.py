@@ -26,7 +26,7 @@ def find_boxes(
 
 
 def boxes(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(n, 4) boxes and (n,) whether they are planar, of (n, 3, 3) corners as ``project_vertices`` writes them."""
+    """(n, 4) boxes and (n,) whether they are planar, of (n, 3, 3) corners as ``projected`` gives them."""
     device, count = launch.resolve_device(None), len(corners)
     box, planar = wp.empty(count, dtype=wp.vec4i, device=device), wp.empty(count, dtype=int, device=device)
     given = wp.array(np.asarray(corners, float), dtype=wp.vec3d, device=device)

@@ -6,10 +6,13 @@ import warp as wp
 
 import ldtrefl
 from ldtrefl.device import launch
-from ldtrefl.frame.projection import chunks_of
-from ldtrefl.frame.zbuffer import LARGE_BOX, draw_small_triangles
+from ldtrefl.frame.large_triangles import LARGE_BOX, none_set_aside
+from ldtrefl.frame.projection import DrawnObject, chunks_of
+from ldtrefl.frame.triangle_rows import Target
+from ldtrefl.frame.zbuffer import draw_triangles
 from ldtrefl.scene.description import Camera, Object
 from ldtrefl.world.records import ObjectRecord
+from ldtrefl.world.triangle_numbers import numbered
 from tests.frame.drawing import gbuffer
 
 WIDTH, FIRST_ROW, END_ROW = 60, 8, 48
@@ -25,18 +28,20 @@ def drawn(corners: np.ndarray) -> np.ndarray:
     depth = corners[..., 2:]
     before = np.concatenate([corners[..., :2], 1 / depth], -1)
     behind = np.concatenate([corners[..., :2] * depth, depth], -1)
-    written = np.where(depth > 0, before, behind)  # as ``project_vertices`` writes them
+    written = np.where(depth > 0, before, behind)  # as ``projected`` gives them
     written = written.reshape(-1, 3)
     record = ObjectRecord()
     record.faces = wp.array(np.arange(3 * count).reshape(-1, 3), dtype=wp.vec3i, device=device)
+    chunks, chunk_count = chunks_of(np.array([count]), device)
+    target, large = Target(), none_set_aside(device)
+    target.keys = wp.zeros((END_ROW - FIRST_ROW) * WIDTH, dtype=wp.int64, device=device)
+    target.width, target.first_row, target.end_row = WIDTH, FIRST_ROW, END_ROW
     objects = wp.array([record], dtype=ObjectRecord, device=device)
-    chunks, chunk_count = chunks_of(np.array([0]), np.array([count]), device)
-    keys = wp.zeros((END_ROW - FIRST_ROW) * WIDTH, dtype=wp.int64, device=device)
-    large, listed = wp.zeros(1, dtype=wp.int32, device=device), wp.empty(count, dtype=wp.int32, device=device)
-    target = [objects, wp.array(written, dtype=wp.vec3d, device=device), WIDTH, FIRST_ROW, END_ROW]
-    launch.launch(draw_small_triangles, chunk_count, [chunks, *target, keys, large, listed], device)
-    assert large.numpy()[0] == 0 and WIDTH * (END_ROW - FIRST_ROW) < int(LARGE_BOX)
-    return keys.numpy().reshape(END_ROW - FIRST_ROW, WIDTH)
+    drawn = wp.array([DrawnObject()], dtype=DrawnObject, device=device)
+    known = [objects, drawn, numbered(np.array([count]), device), wp.array(written, dtype=wp.vec3d, device=device)]
+    launch.launch(draw_triangles, chunk_count, [chunks, *known, target, large], device)
+    assert large.count.numpy()[0] == 0 and WIDTH * (END_ROW - FIRST_ROW) < int(LARGE_BOX)
+    return target.keys.numpy().reshape(END_ROW - FIRST_ROW, WIDTH)
 
 
 def nearness_of(keys: np.ndarray) -> np.ndarray:
@@ -96,8 +101,10 @@ def test_the_nearest_triangle_counts_and_of_two_alike_the_larger_number() -> Non
     square = np.array([[0.0, 0.0], [60.0, 0.0], [0.0, 60.0]])
     depths = (3.0, 1.0, 2.0, 1.0)
     corners = np.stack([np.column_stack([square, np.full(3, depth)]) for depth in depths])
-    key = drawn(corners)[10, 10]
-    assert key & 0x7FFFFFFF == 3 and nearness_of(np.array([key]))[0] == 1.0
+    for order in ([0, 1, 2, 3], [3, 1, 2, 0], [1, 3, 0, 2]):
+        key = drawn(corners[order])[10, 10]
+        expected = max(order.index(1), order.index(3))
+        assert key & 0x7FFFFFFF == expected and nearness_of(np.array([key]))[0] == 1.0
 
 
 def test_triangles_of_every_shape_cover_the_pixels_inside() -> None:

@@ -51,8 +51,8 @@ def test_equal_meshes_and_textures_share_what_is_on_the_device(tmp_path: Path) -
     records = on_device.records.numpy()[1:]
     for name in ("vertices", "faces", "normals", "uvs", "texels", "texel_bytes", "part_texture"):
         assert records[name]["data"][0] == records[name]["data"][1], name
-    triangles = len(MIRROR.geometry.faces)
-    assert records["first_triangle"].tolist() == [triangles, triangles + 1]
+    assert on_device.triangle_counts.tolist() == [len(MIRROR.geometry.faces), 1, 1]
+    assert on_device.vertex_counts.tolist() == [len(MIRROR.geometry.vertices), 3, 3]
 
 
 def test_equal_meshes_share_maps_and_trees(tmp_path: Path) -> None:
@@ -130,9 +130,16 @@ def test_an_object_with_another_mesh_moves_the_numbers_of_those_after_it() -> No
     scene, cpu = Scene(camera=CAMERA, objects=objects), launch.resolve_device(None)
     changed = scene.with_object("a", shape="plane")
     after = DeviceScene(changed, cpu, DeviceScene(scene, cpu))
-    assert after.records.numpy()["first_triangle"].tolist() == [0, 2]
+    assert after.triangle_numbers.first.numpy().tolist() == [0, 2] and after.triangle_counts.tolist() == [2, 12]
 
 
 def test_no_objects() -> None:
     empty = DeviceScene(Scene(camera=CAMERA), launch.resolve_device(None))
     assert len(empty.objects) == 0 and empty.records.shape == (0,) and empty.reflectors == []
+
+
+def test_mirrors_of_more_triangles_than_can_be_numbered_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("ldtrefl.world.device_scene.MOST_NUMBERS", 100)
+    mirrors = tuple(Object(shape="box", material=Material(mirror=0.5)) for _ in range(9))
+    with pytest.raises(ldtrefl.InputError, match="the mirrors have more than 100 triangles, instances counted in"):
+        ldtrefl.render(Scene(camera=CAMERA, objects=mirrors), "ldt", cull="flat")

@@ -41,13 +41,6 @@ def test_powers_of_two_stay_in_float32_whatever_the_size(size: float) -> None:
     assert np.isfinite(records["unit_from_direction"]).all()
 
 
-def test_triangles_and_vertices_are_numbered_through_all_objects() -> None:
-    scene = on_device(*(Object(shape="box", translate=(3.0 * k, 0, 0)) for k in range(3)))
-    records = scene.records.numpy()
-    assert records["first_triangle"].tolist() == [0, 12, 24] and records["first_vertex"].tolist() == [0, 24, 48]
-    assert scene.vertex_counts.tolist() == [24] * 3 and scene.triangle_counts.tolist() == [12] * 3
-
-
 def test_attributes_that_shading_does_not_read_are_left_out() -> None:
     glowing = Material(albedo=0.0, emission=1.0)
     for smooth, material, count in ((True, Material(), 24), (False, Material(), 0), (True, glowing, 0)):

@@ -56,15 +56,6 @@ def test_more_triangles_than_memory_allows_are_refused(monkeypatch: pytest.Monke
         ldtrefl.peel(vertices, np.arange(3000).reshape(-1, 3))
 
 
-def test_more_triangles_than_an_int32_numbers_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("ldtrefl.world.device_scene.MOST_NUMBERS", 100)
-    camera = ldtrefl.Camera(eye=(0, -5, 0), look_at=(0, 0, 0), width=4, height=4)
-    boxes = tuple(ldtrefl.Object(shape="box") for _ in range(9))
-    ldtrefl.render(ldtrefl.Scene(camera=camera, objects=boxes[:4]))
-    with pytest.raises(ldtrefl.InputError, match="the objects have more than 100 triangles, instances counted in"):
-        ldtrefl.render(ldtrefl.Scene(camera=camera, objects=boxes))
-
-
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("size", [1e9, 1e20, 1e38, 1e90])
 def test_a_bulk_too_small_to_be_seen_is_no_trouble(size: float) -> None:

@@ -15,7 +15,7 @@ from ldtrefl.world.records import ObjectRecord
 def read_records(first: int, objects: wp.array(dtype=ObjectRecord), out: wp.array(dtype=float)):
     """Add up some fields of one record."""
     i = first + wp.tid()
-    last = objects[i].vertices[objects[i].first_triangle]
+    last = objects[i].vertices[objects[i].smooth]
     out[i] = objects[i].radius + last[2] + float(objects[i].unit_from_device[1, 3])
 
 
@@ -25,7 +25,7 @@ def test_kernels_read_what_was_written() -> None:
     for k in range(3):
         record = ObjectRecord()
         record.vertices = wp.array(np.full((4, 3), 10.0 * k, np.float32), dtype=wp.vec3, device=cpu)
-        record.first_triangle, record.radius = k, float(k)
+        record.smooth, record.radius = k, float(k)
         matrix = np.eye(4)
         matrix[1, 3] = 100.0 * k
         record.unit_from_device = wp.mat44d(matrix)

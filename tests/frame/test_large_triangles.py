@@ -1,0 +1,29 @@
+"""Triangles that cover many pixels are drawn in strips, or at once where too many are set aside: the same pixels."""
+
+import numpy as np
+import pytest
+
+from ldtrefl.frame import large_triangles
+from ldtrefl.frame.gbuffer import GBuffer
+from ldtrefl.scene.description import Camera, Object
+from tests.frame.drawing import gbuffer
+
+SHEETS = [
+    Object(shape="plane", rotate=(1, k, 0, 70), translate=(0.5 * k - 0.5, 0.4 * k, 0.1), scale=0.8) for k in range(4)
+]
+
+
+@pytest.mark.parametrize("eye", [(0, -3, 0.5), (0.1, 0.05, -0.1)], ids=["before them", "among them"])
+def test_strips_and_whole_triangles_are_the_same(
+    eye: tuple[float, float, float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def seen(room: int, size: int) -> GBuffer:
+        monkeypatch.setattr(large_triangles, "ROOM", room)
+        return gbuffer(Camera(eye=eye, look_at=(0.2, 5, 0), fov_y=60, width=size, height=size), *SHEETS)
+
+    strips, some, none = seen(1 << 16, 128), seen(3, 128), seen(0, 128)
+    assert len(np.unique(strips.objects)) >= 2
+    for found in (some, none):
+        np.testing.assert_array_equal(found.objects, strips.objects)
+        np.testing.assert_array_equal(found.triangles, strips.triangles)
+        np.testing.assert_array_equal(found.view.barycentrics.numpy(), strips.view.barycentrics.numpy())
