@@ -7,7 +7,8 @@ float64, and every place adds up its triangles in the order of their numbers: th
 close others may lie (``welding.py``).
 
 *Sides*: at places where triangles and their mirror images meet, the faces of each side are averaged by themselves
-(``two_sided.py``). Elsewhere all faces of a place are averaged together.
+(``two_sided.py``). Elsewhere all faces of a place are averaged together. Triangles that are wound the other way than
+those about them are turned for that (``winding.py``).
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from ldtrefl.device import launch
 from ldtrefl.device.bins import bin_items
 from ldtrefl.scene.two_sided import SMALLEST_SINE, sides_by_places
 from ldtrefl.scene.welding import first_of_equals
+from ldtrefl.scene.winding import turned_triangles
 
 FEW_CORNERS = wp.constant(24)
 """Corners at a place up to which every pair is compared, to find triangles that mirror each other. Most have six."""
@@ -31,6 +33,9 @@ FOLDED = wp.constant(1)
 
 CROWDED = wp.constant(2)
 """Flag of a place: more corners meet there than are compared."""
+
+UNLIKE = wp.constant(4)
+"""Flag of a place: two triangles run the same way along an edge there."""
 
 SMALLEST_EXPONENT = -1000
 """Exponent of the largest coordinate: meshes that are smaller are not scaled up to 1, since the factor would
@@ -83,23 +88,28 @@ def average_about_places(
     opposite: wp.array(dtype=wp.vec2i),
     # Out:
     normals_out: wp.array(dtype=wp.vec3),
-    folds_out: wp.array(dtype=wp.uint8),  # FOLDED, CROWDED or 0
+    flags_out: wp.array(dtype=wp.uint8),  # FOLDED or CROWDED, and UNLIKE
 ):
-    """Average the facets' normals about one place, and look for triangles that mirror each other."""
+    """Average the facets' normals about one place, and look for triangles that mirror each other, or are wound
+    differently."""
     i = first + wp.tid()
     begin, end = start[i], start[i + 1]
     total = wp.vec3d()
     fold = int(0)
-    if end - begin > FEW_CORNERS:
+    unlike = int(0)
+    is_crowded = end - begin > FEW_CORNERS
+    if is_crowded:
         fold = CROWDED
     for k in range(begin, end):
         pair = opposite[k]
         total += weighted_normal(vertices[i], vertices[pair[0]], vertices[pair[1]], scale)
-        if fold == 0:
+        if not is_crowded:
             for other in range(begin, k):
+                if opposite[other][0] == pair[0] or opposite[other][1] == pair[1]:
+                    unlike = UNLIKE
                 if opposite[other][0] == pair[1] and opposite[other][1] == pair[0]:
                     fold = FOLDED
-    folds_out[i] = wp.uint8(fold)
+    flags_out[i] = wp.uint8(fold | unlike)
     length = wp.length(total)
     if length > wp.float64(0.0):
         total = total / length
@@ -178,25 +188,38 @@ def _smoothed(vertices: np.ndarray, faces: np.ndarray, pieces: np.ndarray | None
         raise InputError(
             f"{len(faces)} triangles are too many for smooth normals, at most {MOST_CORNERS // 3} are allowed"
         )
-    device = launch.resolve_device("cpu")
     largest = max(float(vertices.max()), -float(vertices.min()))
     # By a power of two, so that nothing is rounded.
     scale = float(np.ldexp(1.0, -max(int(np.frexp(largest)[1]), SMALLEST_EXPONENT)))
     firsts = first_of_equals(vertices if pieces is None else np.column_stack([vertices, pieces]))
-    places = np.ascontiguousarray(faces if firsts is None else firsts[faces]).reshape(-1)
-    shared = wp.array(places, dtype=wp.int32, device=device, copy=False)
-    start, ranks = bin_items(shared, len(vertices), device)
-    opposite = wp.empty(len(places), dtype=wp.vec2i, device=device)
-    launch.launch(list_corners, len(places), [shared, start, ranks, opposite], device)
-    normals = wp.empty(len(vertices), dtype=wp.vec3, device=device)
-    folds = wp.empty(len(vertices), dtype=wp.uint8, device=device)
-    points = wp.array(vertices, dtype=wp.vec3d, device=device, copy=False)
-    arguments = [points, wp.float64(scale), start, opposite, normals, folds]
-    launch.launch(average_about_places, len(vertices), arguments, device)
-    of_places = normals.numpy()
+    places = np.ascontiguousarray(faces if firsts is None else firsts[faces])
+    of_places, flags = _averaged(vertices, places, scale)
+    turned = turned_triangles(places) if (flags & UNLIKE).any() else np.zeros(len(places), bool)
+    if turned.any():
+        places = np.where(turned[:, None], places[:, [0, 2, 1]], places)
+        of_places, flags = _averaged(vertices, places, scale)
     of_vertices = of_places if firsts is None else of_places[firsts]
+    is_suspect = (flags & (FOLDED | CROWDED)) > 0
     none = np.zeros(0, np.int64)
-    if not folds.numpy().any():
+    if not is_suspect.any():
         return _Smoothed(of_vertices, none, none, np.zeros((0, 3), np.float32))
-    corners, numbers, side_normals = sides_by_places(vertices * scale, places.reshape(-1, 3), folds.numpy() > 0)
-    return _Smoothed(of_vertices, corners, numbers, side_normals)
+    corners, numbers, side_normals = sides_by_places(vertices * scale, places, is_suspect)
+    triangle, k = np.divmod(corners, 3)
+    corners = np.where(turned[triangle], 3 * triangle + (3 - k) % 3, corners)
+    order = np.argsort(corners)
+    return _Smoothed(of_vertices, corners[order], numbers[order], side_normals)
+
+
+def _averaged(vertices: np.ndarray, places: np.ndarray, scale: float) -> tuple[np.ndarray, np.ndarray]:
+    """(n, 3) float32 mean of the facets' normals about each place, and (n,) its flags, of (m, 3) triangles."""
+    device = launch.resolve_device("cpu")
+    shared = wp.array(places.reshape(-1), dtype=wp.int32, device=device, copy=False)
+    start, ranks = bin_items(shared, len(vertices), device)
+    opposite = wp.empty(places.size, dtype=wp.vec2i, device=device)
+    launch.launch(list_corners, places.size, [shared, start, ranks, opposite], device)
+    normals = wp.empty(len(vertices), dtype=wp.vec3, device=device)
+    flags = wp.empty(len(vertices), dtype=wp.uint8, device=device)
+    points = wp.array(vertices, dtype=wp.vec3d, device=device, copy=False)
+    arguments = [points, wp.float64(scale), start, opposite, normals, flags]
+    launch.launch(average_about_places, len(vertices), arguments, device)
+    return normals.numpy(), flags.numpy()

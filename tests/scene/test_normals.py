@@ -14,6 +14,9 @@ from tests.scene.sheets import plain_mean, sheet
 SCANS_WITH_FOLDS = {"happy_buddha.ply": 600}
 """Meshes in which some triangles lie on their mirror images: how many corners may differ from a plain mean."""
 
+WOUND_BOTH_WAYS = {"mosquito_in_amber.ply": 600}
+"""Meshes of which some triangles are wound against those about them: in a plain mean their normals cancel."""
+
 SLIVERS = {"mosquito_in_amber.ply": 10, "gyroid": 150}
 """Meshes with triangles that trimesh leaves out as too small, by their size: how many corners may differ."""
 
@@ -23,7 +26,36 @@ def test_normals_are_those_of_an_outside_program(mesh_or_shape: Callable, name: 
     mesh = mesh_or_shape(name)
     normals = vertex_normals(mesh.vertices, mesh.faces)
     differs = np.abs(normals - plain_mean(mesh.vertices, mesh.faces)).max(axis=1) > 1e-6
-    assert differs[mesh.faces].sum() <= {**SCANS_WITH_FOLDS, **SLIVERS}.get(name, 0)
+    assert differs[mesh.faces].sum() <= {**SCANS_WITH_FOLDS, **SLIVERS, **WOUND_BOTH_WAYS}.get(name, 0)
+
+
+@pytest.mark.parametrize("share", [0.02, 0.3, 0.5])
+def test_triangles_wound_against_each_other_have_the_normals_of_those_that_are_not(share: float) -> None:
+    """But for the side of each part, here a closed knot and an open sheet."""
+    knot, (vertices, faces) = shapes.make("torus_knot", {"segments": [96, 16]}), sheet()
+    turned = np.random.default_rng(1).random(len(knot.faces) + len(faces)) < share
+    alike = np.concatenate([knot.faces, len(knot.vertices) + faces])
+    vertices = np.concatenate([knot.vertices, vertices])
+    wound = np.where(turned[:, None], alike[:, ::-1], alike)
+    expected, found = (vertex_normals(vertices, x.astype(np.int32)) for x in (alike, wound))
+    for part in (slice(len(knot.vertices)), slice(len(knot.vertices), None)):
+        assert np.array_equal(found[part], expected[part]) or (
+            share == 0.5 and np.array_equal(found[part], -expected[part])
+        )
+
+
+def test_a_doubled_sheet_keeps_its_sides_beside_triangles_wound_against_each_other() -> None:
+    """Corner numbers are those of the faces as they are given."""
+    knot, (vertices, faces) = shapes.make("torus_knot", {"segments": [96, 16]}), sheet()
+    wound = np.where(np.arange(len(knot.faces))[:, None] % 3 == 0, knot.faces[:, ::-1], knot.faces)
+    doubled = np.concatenate([faces, faces[:, ::-1]]) + len(knot.vertices)
+    every = np.concatenate([wound, doubled]).astype(np.int32)
+    sources, split, normals = split_by_side(np.concatenate([knot.vertices, vertices]), every)
+    assert np.array_equal(sources[split], every)
+    np.testing.assert_array_equal(normals[: len(knot.vertices)], vertex_normals(knot.vertices, knot.faces))
+    front, back = split[len(wound) : len(wound) + len(faces)], split[len(wound) + len(faces) :, ::-1]
+    np.testing.assert_allclose(normals[front], -normals[back], atol=1e-6)
+    np.testing.assert_allclose(normals[front], vertex_normals(vertices, faces.astype(np.int32))[faces], atol=1e-6)
 
 
 def test_bits_do_not_depend_on_threads() -> None:

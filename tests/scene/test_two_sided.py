@@ -69,11 +69,9 @@ def test_a_vertex_that_serves_several_sides_has_no_normal() -> None:
 
 
 def test_ordinary_meshes_have_no_sides() -> None:
-    """Neither open edges, nor faces wound against each other, nor triangles modelled twice the same way."""
+    """Neither open edges nor triangles modelled twice the same way."""
     vertices, faces = sheet()
-    rng = np.random.default_rng(0)
-    wound = np.where(rng.random(len(faces))[:, None] < 0.3, faces[:, ::-1], faces)
-    for some in (faces, wound, np.concatenate([faces, faces]), np.concatenate([faces, np.roll(faces, 1, axis=1)])):
+    for some in (faces, np.concatenate([faces, faces]), np.concatenate([faces, np.roll(faces, 1, axis=1)])):
         sources, split, normals = split_by_side(vertices, some.astype(np.int32))
         assert len(sources) == len(vertices) and np.array_equal(split, some)
         np.testing.assert_allclose(normals, plain_mean(vertices, some), atol=1e-6)
