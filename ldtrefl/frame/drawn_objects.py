@@ -48,16 +48,16 @@ class DrawnObjects:
         fields = ("numbers", "depths", "projections")
         return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in fields))
 
-    def some(self, part: slice) -> DrawnObjects:
+    def some(self, part: slice | np.ndarray) -> DrawnObjects:
         """Part of them."""
         return DrawnObjects(self.numbers[part], self.depths[part], self.projections[part])
 
     def on_device(self, first_corners: np.ndarray, device: wp.Device) -> wp.array:
-        """(n,) ``DrawnObject``, given the place of the first corner of each object of the scene."""
+        """(n,) ``DrawnObject``, given the place of each one's first corner, -1 if its corners are not kept."""
         made = wp.empty(len(self.numbers), dtype=DrawnObject, device="cpu")
         if len(self.numbers):
             rows = made.numpy()
-            rows["object"], rows["first_corner"] = self.numbers, first_corners[self.numbers]
+            rows["object"], rows["first_corner"] = self.numbers, first_corners
             for axis, name in enumerate(("row_x", "row_y", "row_z")):
                 rows[name] = self.projections[:, axis]
         return made.to(device)

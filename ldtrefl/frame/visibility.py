@@ -162,12 +162,13 @@ def resolved(drawing: Drawing, scene: DeviceScene) -> GBuffer:
     view.camera = camera_view(camera, scene.device_from_world, drawing.band)
     out.object, out.triangle, out.barycentrics = view.object, view.triangle, view.barycentrics
     out.reflector = view.reflector
-    drawn = DrawnObjects.joined(drawing.drawn)
+    drawn = DrawnObjects.joined([objects for objects, _ in drawing.drawn])
+    first_corners = np.concatenate([first for _, first in drawing.drawn])
     place_of = np.full(len(scene.objects), -1, np.int32)
     place_of[drawn.numbers] = np.arange(len(drawn.numbers))
     places = wp.array(place_of, dtype=wp.int32, device=device)
     run = PIXELS_IN_A_ROW if device.is_cpu else 1
-    known = [scene.records, drawn.on_device(drawing.room.first, device), places, scene.triangle_numbers]
+    known = [scene.records, drawn.on_device(first_corners, device), places, scene.triangle_numbers]
     inputs = [drawing.keys, *known, drawing.room.corners, camera.width, drawing.band.first_row, run, out]
     launch.launch(resolve_pixels, -(-pixels // run), inputs, device)
     return GBuffer(scene, camera, view, drawing.band)

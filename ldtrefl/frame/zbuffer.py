@@ -1,8 +1,8 @@
 """The z-buffer: which triangle is nearest in each pixel, and how near.
 
 Objects are drawn together by the same three launches, however many there are: their vertices and triangles are handed
-out in chunks. As many are drawn together as there is room for their corners. The triangles are those of
-``geometry/perspective_raster.py``.
+out in chunks. As many are drawn together as there is room for their corners. Objects of which many have the same mesh
+are drawn by ``instances.py``. The triangles are those of ``geometry/perspective_raster.py``.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import warp as wp
 from ldtrefl.device import launch
 from ldtrefl.device.bins import CHUNK
 from ldtrefl.frame.drawn_objects import DrawnObjects
+from ldtrefl.frame.instances import draw_all_instances, instances_among
 from ldtrefl.frame.large_triangles import LargeTriangles, draw_or_set_aside, draw_those_set_aside, none_set_aside
 from ldtrefl.frame.projection import Chunks, DrawnObject, chunks_of, project_vertices
 from ldtrefl.frame.triangle_rows import Target, Triangle
@@ -99,8 +100,8 @@ class Drawing:
         self.room = room
         self.keys = wp.zeros(camera.width * band.rows, dtype=wp.int64, device=room.corners.device)
         """(h * w,) int64: nearness of what a pixel sees, then its triangle's number; 0 where nothing is seen."""
-        self.drawn: list[DrawnObjects] = []
-        """What was drawn."""
+        self.drawn: list[tuple[DrawnObjects, np.ndarray]] = []
+        """What was drawn, and the place of each object's first corner, -1 if its corners are not kept."""
 
     def over(self) -> Drawing:
         """A copy to draw other objects over."""
@@ -110,31 +111,45 @@ class Drawing:
         return copy
 
     def draw(self, scene: DeviceScene, objects: DrawnObjects, *, are_projected: bool = False) -> None:
-        """Draw objects; ``are_projected`` says that their corners are in the room."""
-        self.drawn.append(objects)
-        if self.room.keeps:
-            self._draw(scene, objects, self.room, are_projected=are_projected)
-            return
-        for part, counts in _parts(scene.vertex_counts[objects.numbers]):
-            first = np.empty(len(scene.objects), np.int64)
-            first[objects.numbers[part]] = np.cumsum(counts) - counts
-            room = CornerRoom(wp.empty(int(counts.sum()), dtype=wp.vec3d, device=scene.device), first)
-            self._draw(scene, objects.some(part), room, are_projected=False)
+        """Draw objects; ``are_projected`` says that corners that are kept are in the room already."""
+        are_instances = instances_among(scene, objects)
+        self._draw_apart(scene, objects.some(~are_instances), are_projected=are_projected)
+        if are_instances.any():
+            instances = objects.some(are_instances)
+            self.drawn.append((instances, np.full(len(instances.numbers), -1)))
+            draw_all_instances(scene, instances, self._target())
 
-    def _draw(self, scene: DeviceScene, objects: DrawnObjects, room: CornerRoom, *, are_projected: bool) -> None:
-        """Draw objects for whose corners there is room."""
-        device, drawn = scene.device, objects.on_device(room.first, scene.device)
+    def _draw_apart(self, scene: DeviceScene, objects: DrawnObjects, *, are_projected: bool) -> None:
+        """Draw objects that are not instances."""
+        counts, room = scene.vertex_counts[objects.numbers], self.room
+        self.drawn.append((objects, room.first[objects.numbers]))
+        if room.keeps:
+            self._draw(scene, objects, room.corners, room.first[objects.numbers], are_projected=are_projected)
+            return
+        for part, of_part in _parts(counts):
+            corners = wp.empty(int(of_part.sum()), dtype=wp.vec3d, device=scene.device)
+            self._draw(scene, objects.some(part), corners, np.cumsum(of_part) - of_part, are_projected=False)
+
+    def _draw(
+        self, scene: DeviceScene, objects: DrawnObjects, corners: wp.array, first: np.ndarray, *, are_projected: bool
+    ) -> None:
+        """Draw objects whose corners have their places from ``first`` on."""
+        device, drawn = scene.device, objects.on_device(first, scene.device)
         if not are_projected:
             chunks, count = chunks_of(scene.vertex_counts[objects.numbers], device)
-            launch.launch(project_vertices, count, [chunks, scene.records, drawn, room.corners], device)
+            launch.launch(project_vertices, count, [chunks, scene.records, drawn, corners], device)
+        chunks, count = chunks_of(scene.triangle_counts[objects.numbers], device)
+        target, large, numbers = self._target(), none_set_aside(device), scene.triangle_numbers
+        inputs = [chunks, scene.records, drawn, numbers, corners, target, large]
+        launch.launch(draw_triangles, count, inputs, device)
+        draw_those_set_aside(large, scene.records, drawn, numbers, corners, target)
+
+    def _target(self) -> Target:
+        """The z-buffer as kernels draw to it."""
         target = Target()
         target.keys, target.width = self.keys, self.camera.width
         target.first_row, target.end_row = self.band.first_row, self.band.first_row + self.band.rows
-        chunks, count = chunks_of(scene.triangle_counts[objects.numbers], device)
-        large, numbers = none_set_aside(device), scene.triangle_numbers
-        inputs = [chunks, scene.records, drawn, numbers, room.corners, target, large]
-        launch.launch(draw_triangles, count, inputs, device)
-        draw_those_set_aside(large, scene.records, drawn, numbers, room.corners, target)
+        return target
 
 
 def _parts(counts: np.ndarray) -> Iterator[tuple[slice, np.ndarray]]:

@@ -11,6 +11,7 @@ from ldtrefl.device import warp_abi
 from ldtrefl.files.stored_picture import StoredPicture
 from ldtrefl.scene.mesh import Mesh
 from ldtrefl.world.appearance import Appearance, appearance_of
+from ldtrefl.world.clusters import Clusters, clustered
 from ldtrefl.world.outliers import Outliers, outliers_of
 
 
@@ -37,6 +38,11 @@ class DeviceMesh:
     def outliers(self) -> Outliers:
         """The mesh's triangles far outside its bulk."""
         return outliers_of(self.mesh, self.vertices.device)
+
+    @functools.cached_property
+    def clusters(self) -> Clusters:
+        """The mesh's triangles in clusters, of a mesh without outliers."""
+        return clustered(self.mesh, self.vertices.device)
 
     @functools.cached_property
     def exact_vertices(self) -> wp.array:
