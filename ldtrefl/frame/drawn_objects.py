@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
+from ldtrefl.device.struct_arrays import host_structs
 from ldtrefl.frame.projection import DrawnObject
 from ldtrefl.scene.description import Camera
 from ldtrefl.world.camera import camera_axes, pixels_from_world
@@ -54,12 +55,10 @@ class DrawnObjects:
 
     def on_device(self, first_corners: np.ndarray, device: wp.Device) -> wp.array:
         """(n,) ``DrawnObject``, given the place of each one's first corner, -1 if its corners are not kept."""
-        made = wp.empty(len(self.numbers), dtype=DrawnObject, device="cpu")
-        if len(self.numbers):
-            rows = made.numpy()
-            rows["object"], rows["first_corner"] = self.numbers, first_corners
-            for axis, name in enumerate(("row_x", "row_y", "row_z")):
-                rows[name] = self.projections[:, axis]
+        made, rows = host_structs(len(self.numbers), DrawnObject)
+        rows["object"], rows["first_corner"] = self.numbers, first_corners
+        for axis, name in enumerate(("row_x", "row_y", "row_z")):
+            rows[name] = self.projections[:, axis]
         return made.to(device)
 
 

@@ -15,7 +15,7 @@ import warp as wp
 
 from ldtrefl.device import warp_abi
 from ldtrefl.device.stats import Stats
-from ldtrefl.device.struct_copies import struct_copies
+from ldtrefl.device.struct_arrays import copy_structs, host_structs
 from ldtrefl.world.device_scene import DeviceScene
 
 RAY_BLOCK = wp.constant(64)
@@ -84,8 +84,9 @@ def array_of_views(views: Sequence[object], view: type, device: wp.Device) -> wp
 
 def array_of_shared_views(views: Sequence[object], numbers: np.ndarray, view: type, device: wp.Device) -> wp.array:
     """The same for n objects that share views: ``numbers``, (n,), are those of each object's."""
-    one_each = array_of_views(views, view, wp.get_device("cpu")).numpy()
-    return wp.array(struct_copies(one_each, numbers), dtype=view, device=device, copy=False)
+    made, copies = host_structs(len(numbers), view)
+    copy_structs(array_of_views(views, view, wp.get_device("cpu")).numpy(), numbers, copies)
+    return made.to(device)
 
 
 def block_of(device: wp.Device) -> int:

@@ -16,6 +16,7 @@ import numpy as np
 import warp as wp
 
 from ldtrefl.base.errors import InputError
+from ldtrefl.device.struct_arrays import copy_structs, host_structs
 from ldtrefl.files.srgb import linear_of_bytes
 from ldtrefl.scene.description import Camera, Scene
 from ldtrefl.world.bounding_spheres import bounding_radii
@@ -24,7 +25,7 @@ from ldtrefl.world.device_mesh import DeviceMesh
 from ldtrefl.world.device_object import DeviceObject, DeviceObjects
 from ldtrefl.world.device_space import device_space
 from ldtrefl.world.lighting import lighting_of
-from ldtrefl.world.object_records import object_records, set_places
+from ldtrefl.world.object_records import fill_places, fill_records
 from ldtrefl.world.records import LightingRecord, ObjectRecord
 from ldtrefl.world.top_level import TopLevel, order_of, top_level
 from ldtrefl.world.triangle_numbers import MOST_NUMBERS, TriangleNumbers, numbered
@@ -85,44 +86,60 @@ class DeviceScene:
         """(objects,) int64."""
         self.triangle_numbers: TriangleNumbers = numbered(self.triangle_counts, self.device)
         every = np.arange(len(self.mesh_of))
-        self.world_from_unit, self.spheres, self._host_records = self._placed(every)
-        """(objects, 4, 4) float64; (objects, 4) float64, centre and radius of each bounding sphere in device space;
-        (objects,) ``records`` on the host."""
+        self.world_from_unit: np.ndarray = np.empty((len(every), 4, 4))
+        """(objects, 4, 4) float64."""
+        self.spheres: np.ndarray = np.empty((len(every), 4))
+        """(objects, 4) float64: centre and radius of each bounding sphere, in device space."""
         self._stamps = np.full(len(every), next(_STAMPS))
         """(objects,) int64: equal in two scenes, one of which comes from the other, if the object has not moved."""
         if before is not None:  # an object was deformed
             stands = ~self._changed_since(before)
             self._stamps[stands] = before._stamps[stands]
-        self.records = wp.array(self._host_records, dtype=ObjectRecord, device=self.device, copy=False)
+        made, self._records = host_structs(len(every), ObjectRecord)
+        """(objects,) ``records`` on the host."""
+        self._fill(every)
+        self._place(every)
+        self.records: wp.array = made.to(self.device)
 
     def _take_over(self, before: DeviceScene) -> None:
         """Take over all objects but those that have changed. Device space and the meshes are the same."""
         self.meshes, self.mesh_of, self.triangle_numbers = before.meshes, before.mesh_of, before.triangle_numbers
         self.triangle_counts, self.vertex_counts = before.triangle_counts, before.vertex_counts
-        changed = np.flatnonzero(self._changed_since(before))
+        is_changed, now, then = self._changed_since(before), self.scene.objects, before.scene.objects
+        changed = np.flatnonzero(is_changed)
         self.world_from_unit, self.spheres = before.world_from_unit.copy(), before.spheres.copy()
-        self._host_records, self._stamps = before._host_records.copy(), before._stamps.copy()
-        placed = self._placed(changed)
-        for values, own in zip(placed, (self.world_from_unit, self.spheres, self._host_records), strict=True):
-            own[changed] = values
-        self._stamps[changed] = next(_STAMPS)
-        self.records = wp.array(self._host_records, dtype=ObjectRecord, device=self.device, copy=False)
+        self._stamps = np.where(is_changed, next(_STAMPS), before._stamps)
+        made, self._records = host_structs(len(self.mesh_of), ObjectRecord)
+        copy_structs(before._records, np.arange(len(self.mesh_of)), self._records)
+        looks = [k for k in changed if now[k].material is not then[k].material or now[k].smooth != then[k].smooth]
+        if looks:
+            self._fill(np.array(looks))
+        self._place(changed)
+        self.records = made.to(self.device)
 
     def _changed_since(self, before: DeviceScene) -> np.ndarray:
         """(objects,) bool: which objects are others than in the scene that this one comes from."""
-        pairs = zip(self.scene.objects, before.scene.objects, strict=True)
-        return np.fromiter(itertools.starmap(operator.is_not, pairs), bool, len(self.scene.objects))
+        now, then = self.scene.objects, before.scene.objects
+        return np.fromiter(map(operator.is_not, now, then), bool, len(now))
 
-    def _placed(self, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """``world_from_unit``, ``spheres`` and ``_host_records`` of the objects of these numbers."""
-        sources, mesh_of = [self.scene.objects[number] for number in numbers], self.mesh_of[numbers]
+    def _fill(self, numbers: np.ndarray) -> None:
+        """Fill in all but the places of the objects of these numbers."""
+        records, sources = self._records[numbers], [self.scene.objects[number] for number in numbers]
+        known = [self.meshes, self.mesh_of[numbers], self._decoded]
+        fill_records(records, sources, *known, skip_attributes=self._skip_attributes)
+        self._records[numbers] = records
+
+    def _place(self, numbers: np.ndarray) -> None:
+        """Fill in the places of the objects of these numbers."""
+        mesh_of, records = self.mesh_of[numbers], self._records[numbers]
         frames = np.array([_object_from_unit(mesh) for mesh in self.meshes]).reshape(-1, 4, 4)
         world_from_unit = self.scene.layout.world_from_object[numbers] @ frames[mesh_of]
         device_from_unit = self.device_from_world @ world_from_unit
         radii = bounding_radii(self.meshes, mesh_of, device_from_unit)
-        records = object_records(sources, self.meshes, mesh_of, self._decoded, skip_attributes=self._skip_attributes)
-        set_places(records, device_from_unit, radii)
-        return world_from_unit, np.concatenate([device_from_unit[:, :3, 3], radii[:, None]], axis=1), records
+        fill_places(records, device_from_unit, radii)
+        self.world_from_unit[numbers] = world_from_unit
+        self.spheres[numbers, :3], self.spheres[numbers, 3] = device_from_unit[:, :3, 3], radii
+        self._records[numbers] = records
 
     @functools.cached_property
     def objects(self) -> DeviceObjects:
@@ -142,7 +159,7 @@ class DeviceScene:
     @functools.cached_property
     def is_reflector(self) -> np.ndarray:
         """(objects,) bool."""
-        return self._host_records["mirror"].max(axis=1, initial=0.0) > 0.0
+        return self._records["mirror"].max(axis=1, initial=0.0) > 0.0
 
     @property
     def reflectors(self) -> list[DeviceObject]:

@@ -13,7 +13,7 @@ from operator import attrgetter
 import numpy as np
 import warp as wp
 
-from ldtrefl.device.struct_copies import struct_copies
+from ldtrefl.device.struct_arrays import copy_structs
 from ldtrefl.files.stored_picture import StoredPicture
 from ldtrefl.scene.description import Material, Object
 from ldtrefl.world.device_mesh import DeviceMesh
@@ -23,17 +23,19 @@ MOST_DOUBLINGS = 120
 """Largest exponent, up or down, of the power of two ``unit_per_device``: float32 reaches from 2^-126 to 2^127."""
 
 
-def object_records(
+def fill_records(
+    records: np.ndarray,
     sources: Sequence[Object],
     meshes: Sequence[DeviceMesh],
     mesh_of: np.ndarray,
     decoded: wp.array,
     *,
     skip_attributes: bool,
-) -> np.ndarray:
-    """(n,) records of n objects, as numpy holds a ``wp.array`` of ``ObjectRecord``; their places are left at zero.
+) -> None:
+    """Fill in all of objects but their places.
 
     Args:
+        records: (n,) what is filled in, as numpy holds an array of ``ObjectRecord``.
         sources: the objects.
         meshes: some meshes.
         mesh_of: (n,) the number of each object's mesh.
@@ -54,14 +56,13 @@ def object_records(
         mesh, picture = divmod(kind // 2, len(pictures))
         uses = {"needs_normals": bool(kind % 2), "skip_attributes": skip_attributes}
         shared.append(_shared_record(meshes[mesh], pictures[picture], decoded, **uses))
-    made = struct_copies(wp.array(shared, dtype=ObjectRecord, device="cpu").numpy(), kind_of)
-    made["smooth"], made["fresnel"] = smooth, [material.fresnel for material in materials]
-    made["albedo"], made["mirror"], made["emission"] = albedo, mirror, emission
-    made["returns"] = _sides_with_returns(meshes, mesh_of, mirror.max(axis=1, initial=0.0) > 0.0)
-    return made
+    copy_structs(wp.array(shared, dtype=ObjectRecord, device="cpu").numpy(), kind_of, records)
+    records["smooth"], records["fresnel"] = smooth, [material.fresnel for material in materials]
+    records["albedo"], records["mirror"], records["emission"] = albedo, mirror, emission
+    records["returns"] = _sides_with_returns(meshes, mesh_of, mirror.max(axis=1, initial=0.0) > 0.0)
 
 
-def set_places(records: np.ndarray, device_from_unit: np.ndarray, radii: np.ndarray) -> None:
+def fill_places(records: np.ndarray, device_from_unit: np.ndarray, radii: np.ndarray) -> None:
     """Fill in where objects stand.
 
     Args:
