@@ -15,7 +15,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Protocol, cast
 
-import numpy as np
 import warp as wp
 
 BOUNDS_FIELDS = (("shape", ctypes.c_uint32 * 1), ("size", ctypes.c_size_t), ("coord_mult", ctypes.c_size_t))
@@ -210,11 +209,6 @@ def array_of_structs(structs: Sequence[object], dtype: type, device: wp.Device) 
     if contents:
         ctypes.memmove(made.ptr, b"".join(contents), size * len(contents))
     return made.to(device)
-
-
-def struct_array(dtype: type, count: int) -> np.ndarray:
-    """(count,) zeros with the fields of a ``wp.struct`` class, from which ``wp.array`` makes an array of it."""
-    return np.zeros(count, np.dtype(cast("_StructType", dtype).numpy_dtype()))  # type: ignore[call-overload]
 
 
 class _StructType(Protocol):

@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 import warp as wp
 
-from ldtrefl.device import warp_abi
+from ldtrefl.device.struct_arrays import host_structs
 
 GROUP = 8
 """Children of a node, at most."""
@@ -62,10 +62,10 @@ def top_level(centres: np.ndarray, radii: np.ndarray, order: np.ndarray, device:
         levels.append(_grouped(below[0], below[1], first))
         first += len(below[1])
     joined = [np.concatenate(arrays) for arrays in zip(*levels, strict=True)]
-    nodes = warp_abi.struct_array(TopNode, len(joined[1]))
+    array, nodes = host_structs(len(joined[1]), TopNode)
     for name, values in zip(("centre", "radius", "first", "count"), joined, strict=True):
         nodes[name][...] = values
-    made.nodes, made.root = wp.array(nodes, dtype=TopNode, device=device), len(nodes) - 1
+    made.nodes, made.root = array.to(device), len(nodes) - 1
     return made
 
 
