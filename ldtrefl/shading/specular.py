@@ -68,13 +68,11 @@ def mirror_direction(direction: wp.vec3, normal: wp.vec3, facet: wp.vec3) -> wp.
     Args:
         direction: of the ray that arrives, unit; 0 if the eye touches the surface: the ray then leaves along ``facet``.
         normal: the shading normal, unit.
-        facet: the facet's normal, of any length, facing the viewer.
+        facet: the facet's normal, unit, facing the viewer.
     """
     leaving = mirrored(direction, normal)
     rise = wp.dot(leaving, facet)
-    # By squares: most rays need no root.
-    if rise * wp.abs(rise) < LEAST_RISE * LEAST_RISE * wp.dot(facet, facet):
-        unit_facet = wp.normalize(facet)
-        if wp.dot(leaving, unit_facet) < least_rise(direction, unit_facet):
-            return bent_direction(direction, normal, unit_facet)
+    if rise < LEAST_RISE:
+        if rise < least_rise(direction, facet):
+            return bent_direction(direction, normal, facet)
     return leaving

@@ -31,7 +31,7 @@ class Surface:
     object: int
     triangle: int
     normal: wp.vec3  # shading normal, unit, on the viewer's side of the facet
-    facet: wp.vec3  # facet normal, of any length, facing the viewer
+    facet: wp.vec3  # facet normal, unit, facing the viewer
     is_back: int  # 1 if the viewer sees the triangle's back, by its winding
     albedo: wp.vec3  # times the texture
     emission: wp.vec3
@@ -135,7 +135,7 @@ def surface_at(
     if wp.dot(facet, view) > 0.0:
         facet = -facet  # to the side that the viewer sees
         surface.is_back = 1
-    surface.facet = facet
+    surface.facet = wp.normalize(facet)
     surface.normal = wp.normalize(interpolated_normal(objects, index, corners, u, v, facet))
     surface.albedo = albedo_at(objects, index, triangle, corners, u, v)
     surface.emission = objects[index].emission

@@ -67,7 +67,7 @@ def unit_vertex(record: ObjectRecord, vertex: int) -> wp.vec3d:
 @wp.func
 def unit_normal(record: ObjectRecord, normal: wp.vec3) -> wp.vec3:
     """A normal of device space, brought to the unit space of an object and to unit length."""
-    return as_single(wp.normalize(wp.transform_vector(wp.transpose(record.device_from_unit), as_double(normal))))
+    return wp.normalize(as_single(wp.transform_vector(wp.transpose(record.device_from_unit), as_double(normal))))
 
 
 @wp.func

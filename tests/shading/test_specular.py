@@ -57,14 +57,13 @@ def mirror_both_ways(
 
 
 def reflected(directions: np.ndarray, normals: np.ndarray, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(n, 3) float32 rays that leave above their facets, and those that the normals alone give. The facets' normals are
-    handed over with lengths from 1/1024 to 8."""
+    """(n, 3) float32 rays that leave above their facets, and those that the normals alone give."""
     count, device = max(len(each) for each in (directions, normals, facets)), launch.resolve_device(None)
-    given = [np.broadcast_to(each, (count, 3)).astype(np.float32) for each in (directions, normals, facets)]
-    given[2] *= np.float32(2.0) ** (np.arange(count) % 14 - 10)[:, None]
+    given = [
+        np.ascontiguousarray(np.broadcast_to(each, (count, 3)), np.float32) for each in (directions, normals, facets)
+    ]
     made = [wp.empty(count, dtype=wp.vec3, device=device) for _ in range(2)]
-    taken = [wp.array(each, dtype=wp.vec3, device=device) for each in given]
-    launch.launch(mirror_both_ways, count, [*taken, *made], device)
+    launch.launch(mirror_both_ways, count, [*(wp.array(each, dtype=wp.vec3) for each in given), *made], device)
     return made[0].numpy(), made[1].numpy()
 
 
