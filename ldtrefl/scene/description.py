@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import operator
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
@@ -172,10 +171,11 @@ class Material:
     @property
     def excess(self) -> tuple[float, str] | None:
         """The largest sum of albedo and mirror in a channel, and the channel, where it is above 1; else None."""
-        sums = tuple(map(operator.add, self.albedo, self.mirror))
-        if max(sums) <= 1.0 + ROUNDING:
+        (a, b, c), (d, e, f) = self.albedo, self.mirror
+        largest = max(a + d, b + e, c + f)
+        if largest <= 1.0 + ROUNDING:
             return None
-        return max(zip(sums, ("red", "green", "blue"), strict=True))
+        return largest, ("red", "green", "blue")[(a + d, b + e, c + f).index(largest)]
 
 
 @refusing_in_one_line
@@ -196,7 +196,7 @@ class Object:
     translate: Vector = (0.0, 0.0, 0.0)
     smooth: Flag = True
     """Shading normals: interpolated, or the facet's."""
-    material: Material = Field(default_factory=Material)
+    material: Material = Material()
 
     def __post_init__(self) -> None:
         # No validators of the class: they would be asked again when a scene takes the object.
@@ -204,7 +204,8 @@ class Object:
             raise ValueError("needs either 'mesh' or 'shape', and not both")
         if self.params and self.shape is None:
             raise ValueError("'params' goes with 'shape'")
-        if max(map(abs, self.rotate[:3])) < SMALLEST:
+        x, y, z, _ = self.rotate
+        if abs(x) < SMALLEST and abs(y) < SMALLEST and abs(z) < SMALLEST:
             raise ValueError(f"rotate: the axis must not be the zero vector, nor shorter than {SMALLEST:g}")
         if (excess := self.material.excess) is not None:
             total, channel = excess
