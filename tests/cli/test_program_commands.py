@@ -91,13 +91,13 @@ def test_wrong_input_is_one_line(run: Callable[..., Done], scene_folder: Path, a
 @pytest.mark.parametrize(
     ("arguments", "variable", "status", "message"),
     [
-        ("info scene.toml --memory 100K", "", 2, "needs 78.5 KiB beside 78.5 KiB"),
+        ("info scene.toml --memory 100K", "", 2, "needs 78.5 KiB beside 94.5 KiB"),
         ("render scene.toml --memory much", "", 2, "--memory: expected a size"),
         ("compare scene.toml --memory 9K", "1G", 2, "allowed are 9.0 KiB"),
         ("peel torus --memory 9K", "", 2, "allowed are 9.0 KiB"),
         ("info torus", "9K", 2, "allowed are 9.0 KiB"),
         ("info scene.toml", "many", 2, "LDTREFL_MEMORY: expected a size"),
-        ("info scene.toml --memory 1G", "9K", 0, "memory: about 157.0 KiB"),
+        ("info scene.toml --memory 1G", "9K", 0, "memory: about 173.0 KiB"),
     ],
 )
 def test_memory_that_is_allowed(
