@@ -71,17 +71,27 @@ struct TreeTriangles : TreeBoxes {
         cross(origin, direction, across);
         const double inverse = -1.0 / dot(normal, direction);
         double t = dot(normal, origin) * inverse, u = dot(across, edge_v) * inverse, v = -dot(across, edge_u) * inverse;
-        if (!(u >= 0.0 && v >= 0.0 && u + v <= 1.0)) t = put_on_edge(origin, direction, edge_u, edge_v, u, v);
+        if (!(u >= 0.0 && v >= 0.0 && u + v <= 1.0)) {
+            if (u >= -BESIDE && v >= -BESIDE && u + v <= 1.0 + BESIDE) put_inside(u, v);
+            else t = put_on_edge(origin, direction, edge_u, edge_v, u, v);
+        }
         const float t_from_origin = greater((float)(t - rays.t_of_origin[ray]), 0.0f);
-        if (!(t >= -START_ROUNDING && is_nearer(rays, ray, t_from_origin, record))) return false;
+        if (!(t >= 0.0 && is_nearer(rays, ray, t_from_origin, record))) return false;
         set_nearest(rays, ray, t_from_origin, record, false);
         rays.u[ray] = (float)u;
         rays.v[ray] = (float)v;
         return true;
     }
 
-    // A ray that passes a triangle by less than rounding meets it where it comes nearest to the edge that it passes.
-    // Where it crosses the plane may be far away if it grazes that. Sets the barycentrics; returns t.
+    // The barycentrics of a place beside a triangle, by less than rounding. The ray crosses the plane there, and that of a
+    // neighbour in the same plane.
+    SHARED void put_inside(double& u, double& v) {
+        u = clamped(u, 1.0);
+        v = clamped(v, 1.0 - u);
+    }
+
+    // A ray that passes a triangle by less than rounding, and crosses its plane far away, for it grazes that, meets it
+    // where it comes nearest to the edge that it passes. Sets the barycentrics; returns t.
     OUT_OF_LINE double put_on_edge(
         const double* origin, const double* direction, const double* edge_u, const double* edge_v, double& u, double& v
     ) {

@@ -29,9 +29,9 @@ EDGE_ON = 2.0e-7
 DEPTH_SLACK = 1.0e-6
 """Unit space: rounding of how far along a ray a corner lies, with some to spare."""
 
-START_ROUNDING = 3.1e-8
-"""Unit space: how far behind its start a ray still meets what it starts on: half a unit in the last place of a float32
-coordinate up to 1."""
+BESIDE = 2.4e-7
+"""A part of a triangle's sides: up to so far beside the triangle a ray that passes it by float32's rounding meets its
+plane. Where it does so farther away, it meets an edge."""
 
 PACKET_SPREAD = 0.25
 """Unit space: how far the starts, and the directions, of the rays of a packet may lie apart along an axis."""
@@ -68,6 +68,7 @@ the patch stands for, which is bent. Of rays that start on a knot of 500,000 tri
 
 
 CONSTANTS: dict[str, float | int] = {
+    "BESIDE": BESIDE,
     "BOX_SLACK": BOX_SLACK,
     "DEPTH_SLACK": DEPTH_SLACK,
     "EDGE_ON": EDGE_ON,
@@ -84,7 +85,6 @@ CONSTANTS: dict[str, float | int] = {
     "PATCH_AXIS_ROW": PATCH_AXIS_ROW,
     "PATCH_TRIANGLE_ROW": PATCH_TRIANGLE_ROW,
     "RAY_BLOCK": RAY_BLOCK,
-    "START_ROUNDING": START_ROUNDING,
     "TRIANGLE_NUMBER_ROW": TRIANGLE_NUMBER_ROW,
     "TREE_NODE": NODE,
     "TREE_STACK": STACK,

@@ -56,6 +56,39 @@ def test_origins_within_on_and_behind_the_object() -> None:
         np.testing.assert_allclose(ours.t[hit], truth.t[hit], rtol=1e-4, atol=1e-5)
 
 
+def rays_at_a_plane(origin_heights: np.ndarray, dives: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """(n, 3) float32 origins above the plane z = 0, on its diagonal or near it, and directions that go down or up."""
+    rng = np.random.default_rng(seed)
+    count = len(dives)
+    turn, x = rng.uniform(0, 2 * np.pi, count), rng.uniform(-0.5, 0.5, count)
+    directions = np.stack([np.cos(turn), np.sin(turn), dives], axis=1).astype(np.float32)
+    met = np.stack([x, x + rng.uniform(-2e-7, 2e-7, count), np.zeros(count)], axis=1)
+    return (met + (origin_heights / dives)[:, None] * directions).astype(np.float32), directions
+
+
+@pytest.mark.parametrize("by", ["ldt", "bvh"])
+def test_a_ray_meets_two_triangles_of_one_plane_at_one_t(by: str) -> None:
+    """Grazing rays that pass their common edge by less than rounding: which triangle it is may be chance, t is not."""
+    plane, rng = shapes.make("plane"), np.random.default_rng(0)
+    dives = -(10 ** rng.uniform(-3, -0.5, 20_000))
+    origins, directions = rays_at_a_plane(-dives * rng.uniform(0.05, 0.3, 20_000), dives, 1)
+    tracer = (ldtrefl.peel if by == "ldt" else ldtrefl.Raycaster)(plane.vertices, plane.faces)
+    expected = -origins[:, 2].astype(float) / directions[:, 2]
+    np.testing.assert_allclose(tracer.trace(origins, directions).t, expected, rtol=2e-7)
+
+
+@pytest.mark.parametrize("by", ["ldt", "bvh"])
+def test_a_ray_meets_nothing_behind_its_start_however_near(by: str) -> None:
+    """A plane a million times larger than what stands on it must not be met from a hundredth of that above it."""
+    plane, rng = shapes.make("plane"), np.random.default_rng(0)
+    heights, climbs = 10 ** rng.uniform(-12, -7.6, 2000), 10 ** rng.uniform(-3, -0.5, 2000)
+    origins, directions = rays_at_a_plane(heights, climbs, 2)
+    assert (origins[:, 2] > 0).all()
+    tracer = (ldtrefl.peel if by == "ldt" else ldtrefl.Raycaster)(plane.vertices, plane.faces)
+    assert np.isinf(tracer.trace(origins, directions).t).all()
+    assert not tracer.occluded(origins, directions).any()
+
+
 @pytest.mark.parametrize("wound", ["outwards", "inwards", "open"])
 def test_patches_show_their_front(wound: str) -> None:
     """From outside a closed object no ray may end on the inside of its far wall or behind its horizon."""
