@@ -40,7 +40,7 @@ CASES: dict[str, tuple[Size, Size]] = {  # name of the module -> full and quick 
     "directions": (Size(2500, 0), Size(200, 0)),
     "origins": (Size(2000, 0), Size(200, 0)),
     "meshes": (Size(4000, 0), Size(300, 0)),
-    "contact": (Size(0, 192), Size(0, 32)),
+    "contact": (Size(0, 192), Size(0, 64)),
     "cameras": (Size(0, 128), Size(0, 24)),
     "reflectors": (Size(0, 128), Size(0, 32)),
     "parameters": (Size(2000, 0), Size(100, 0)),
