@@ -30,6 +30,7 @@ WHOLE = {
     "tests/test_habits.py": "every file",
     "tests/test_layering.py": "the imports of every file",
     "tests/test_mirror_closed_forms.py": "the renderer with all that it stands on",
+    "tests/test_mirror_enclosures.py": "the renderer with all that it stands on",
     "tests/test_readme.py": "README.md",
     "tests/test_scenes.py": "the shipped scenes",
 }
