@@ -69,6 +69,7 @@ struct Vectors {
     SHARED Four chosen(FourFlags is, Four a, Four b) { return is ? a : b; }
     SHARED Eight chosen(EightFlags is, Eight a, Eight b) { return is ? a : b; }
     SHARED Four truncated(Four a) { return __builtin_convertvector(__builtin_convertvector(a, FourFlags), Four); }
+    SHARED Eight truncated(Eight a) { return __builtin_convertvector(__builtin_convertvector(a, EightFlags), Eight); }
 #endif
 
     SHARED int as_int(float x) {

@@ -112,7 +112,7 @@ class Drawing:
 
     def draw(self, scene: DeviceScene, objects: DrawnObjects, *, are_projected: bool = False) -> None:
         """Draw objects; ``are_projected`` says that corners that are kept are in the room already."""
-        are_instances = instances_among(scene, objects)
+        are_instances = instances_among(scene, self.camera, objects)
         self._draw_apart(scene, objects.some(~are_instances), are_projected=are_projected)
         if are_instances.any():
             instances = objects.some(are_instances)

@@ -16,21 +16,22 @@ from ldtrefl.scene.mesh import Mesh
 CLUSTER = wp.constant(16)
 """Triangles in a cluster; the last one may have less. With 8 more boxes are looked at, with 32 more triangles."""
 
-CHILDREN = wp.constant(8)
-"""Boxes within one of the next level."""
+LANES = 8
+"""Boxes in a node, and points in a group, which are looked at together."""
 
 
 @wp.struct
 class Clusters:
-    """The clusters of a mesh."""
+    """The clusters of a mesh, as native code reads them (``instance_boxes.h``, ``cluster_triangles.h``)."""
 
     triangles: wp.array(dtype=wp.int32)  # numbers in the mesh, cluster by cluster
-    corners: wp.array(dtype=wp.vec3ub)  # of each of them, as places among its cluster's points
-    points: wp.array(dtype=wp.vec3)  # the vertices of all clusters
-    first_point: wp.array(dtype=wp.int32)  # (clusters + 1,) of each cluster
-    low: wp.array(dtype=wp.vec3)  # of each box: first those of the clusters, then those of each next level
-    high: wp.array(dtype=wp.vec3)
-    first_box: wp.array(dtype=wp.int32)  # (levels + 1,) of each level; the last level has one box
+    corners: wp.array(
+        dtype=wp.uint8
+    )  # of each cluster the triangles' first, second and third, as places among its points
+    points: wp.array(dtype=wp.float32)  # vertices in groups of eight: their x, their y, their z
+    first_group: wp.array(dtype=wp.int32)  # (clusters + 1,) of each cluster
+    boxes: wp.array(dtype=wp.float32)  # of each node eight: low x, y, z, then high x, y, z; nodes of level 1 first
+    first_node: wp.array(dtype=wp.int32)  # (levels + 1,) of level 1, of level 2, ...; the last level has one node
 
 
 def clustered(mesh: Mesh, device: wp.Device) -> Clusters:
@@ -38,14 +39,15 @@ def clustered(mesh: Mesh, device: wp.Device) -> Clusters:
     points, faces = mesh.unit_vertices, mesh.faces
     order = _halved_again_and_again(points[faces].mean(axis=1))
     numbers, corners, first_point = _vertices_of_clusters(faces[order])
-    low, high, first_box = _boxes(points[numbers], first_point)
+    boxes, first_node = _boxes(points[numbers], first_point)
+    grouped, first_group = _in_groups(points[numbers], first_point)
     view = Clusters()
     view.triangles = wp.array(order, dtype=wp.int32, device=device)
-    view.corners = wp.array(corners, dtype=wp.vec3ub, device=device)
-    view.points = wp.array(points[numbers], dtype=wp.vec3, device=device)
-    view.first_point = wp.array(first_point, dtype=wp.int32, device=device)
-    view.low, view.high = (wp.array(side, dtype=wp.vec3, device=device) for side in (low, high))
-    view.first_box = wp.array(first_box, dtype=wp.int32, device=device)
+    view.corners = wp.array(corners.reshape(-1), dtype=wp.uint8, device=device)
+    view.points = wp.array(grouped.reshape(-1), dtype=wp.float32, device=device)
+    view.first_group = wp.array(first_group, dtype=wp.int32, device=device)
+    view.boxes = wp.array(boxes.reshape(-1), dtype=wp.float32, device=device)
+    view.first_node = wp.array(first_node, dtype=wp.int32, device=device)
     return view
 
 
@@ -70,11 +72,11 @@ def _vertices_of_clusters(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np
     """The vertices of each cluster of (m, 3) faces in a row, each once.
 
     Returns:
-        their numbers, cluster by cluster; (m, 3) uint8, the corners as places among them; (clusters + 1,) int32, where
-        each cluster's begin.
+        their numbers, cluster by cluster; (clusters, 3, CLUSTER) uint8, the triangles' corners as places among them,
+        the last cluster filled up with its last triangle; (clusters + 1,) int32, where each cluster's vertices begin.
     """
-    size, count = int(CLUSTER), len(faces)
-    filled = np.concatenate([faces, np.repeat(faces[-1:], -count % size, axis=0)]).reshape(-1, 3 * size)
+    size = int(CLUSTER)
+    filled = np.concatenate([faces, np.repeat(faces[-1:], -len(faces) % size, axis=0)]).reshape(-1, 3 * size)
     by_number = np.argsort(filled, axis=1, kind="stable")
     numbers = np.take_along_axis(filled, by_number, axis=1)
     is_first = np.diff(numbers, axis=1, prepend=-1) != 0
@@ -82,16 +84,30 @@ def _vertices_of_clusters(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np
     corners = np.empty(filled.shape, np.uint8)
     np.put_along_axis(corners, by_number, places.astype(np.uint8), axis=1)
     first = np.concatenate([[0], np.cumsum(places[:, -1] + 1)]).astype(np.int32)
-    return numbers[is_first], corners.reshape(-1, 3)[:count], first
+    return numbers[is_first], np.ascontiguousarray(corners.reshape(-1, size, 3).transpose(0, 2, 1)), first
 
 
-def _boxes(points: np.ndarray, first_point: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(boxes, 3) low and high corners of the boxes of all levels, and (levels + 1,) int32 where each level begins."""
-    lows = [np.minimum.reduceat(points, first_point[:-1])]
-    highs = [np.maximum.reduceat(points, first_point[:-1])]
-    while len(lows[-1]) > 1:
-        begin = np.arange(0, len(lows[-1]), int(CHILDREN))
-        lows.append(np.minimum.reduceat(lows[-1], begin))
-        highs.append(np.maximum.reduceat(highs[-1], begin))
-    first = np.cumsum([0, *map(len, lows)]).astype(np.int32)
-    return np.concatenate(lows), np.concatenate(highs), first
+def _in_groups(points: np.ndarray, first_point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(groups, 3, 8) the points of each cluster in groups of eight, and (clusters + 1,) int32 where each one's begin.
+    The last group of a cluster is filled up with its last point."""
+    counts = np.diff(first_point)
+    groups = -(-counts // LANES)
+    first_group = np.concatenate([[0], np.cumsum(groups)])
+    of_cluster = np.repeat(np.arange(len(counts)), LANES * groups)
+    place = np.arange(len(of_cluster)) - LANES * first_group[of_cluster]
+    taken = points[first_point[of_cluster] + np.minimum(place, counts[of_cluster] - 1)]
+    return taken.reshape(-1, LANES, 3).transpose(0, 2, 1), first_group.astype(np.int32)
+
+
+def _boxes(points: np.ndarray, first_point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(nodes, 2, 3, 8) the low and high corners of the boxes in each node, and (levels + 1,) int32 where each level's
+    nodes begin. The last node of a level is filled up with copies of its last box."""
+    low, high = (side.reduceat(points, first_point[:-1]) for side in (np.minimum, np.maximum))
+    levels: list[np.ndarray] = []
+    while not levels or len(levels[-1]) > 1:
+        nodes = -(-len(low) // LANES)
+        inside = np.minimum(np.arange(LANES * nodes), len(low) - 1)
+        boxes = np.stack([low[inside], high[inside]], axis=1).reshape(nodes, LANES, 2, 3)
+        levels.append(boxes.transpose(0, 2, 3, 1))
+        low, high = boxes[:, :, 0].min(axis=1), boxes[:, :, 1].max(axis=1)
+    return np.concatenate(levels), np.cumsum([0, *map(len, levels)]).astype(np.int32)

@@ -13,7 +13,7 @@ from stress_cases.inputs import rays_about
 
 import ldtrefl
 from ldtrefl.device import cpu_threads, native_sources, warp_abi
-from ldtrefl.frame import run_rays
+from ldtrefl.frame import instances, run_rays
 from ldtrefl.ldt.exact import walk, wide_tree
 from ldtrefl.ldt.exact.tree import TreeView
 from ldtrefl.ldt.exact.walk import CONSTANTS, FILES, SEARCH, TREE
@@ -53,9 +53,9 @@ SOURCES = {
     "tracing/bvh_walk.h": (bvh_walk.CONSTANTS, bvh_walk.FILES[:-1]),
     **{
         name: (module.CONSTANTS, module.FILES[:number])
-        for module in (march, wide_tree, walk)
+        for module in (march, wide_tree, walk, instances)
         for number, name in enumerate(module.FILES)
-        if name.startswith("ldt")
+        if name.startswith(("ldt", "frame"))
     },
 }
 

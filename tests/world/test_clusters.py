@@ -6,9 +6,9 @@ import pytest
 from ldtrefl.device import launch
 from ldtrefl.scene import shapes
 from ldtrefl.scene.mesh import Mesh
-from ldtrefl.world.clusters import CHILDREN, CLUSTER, clustered
+from ldtrefl.world.clusters import CLUSTER, LANES, clustered
 
-SIZE, CHILD = int(CLUSTER), int(CHILDREN)
+SIZE = int(CLUSTER)
 
 
 def meshes() -> dict[str, Mesh]:
@@ -27,33 +27,32 @@ def meshes() -> dict[str, Mesh]:
 def test_every_triangle_is_in_one_cluster_with_its_corners(name: str) -> None:
     mesh = meshes()[name]
     view = clustered(mesh, launch.resolve_device("cpu"))
-    triangles, corners, points, first = (
-        getattr(view, field).numpy() for field in ("triangles", "corners", "points", "first_point")
-    )
+    triangles, first = view.triangles.numpy(), view.first_group.numpy()
     assert sorted(triangles.tolist()) == list(range(len(mesh.faces)))
-    cluster = np.arange(len(triangles)) // SIZE
-    found = points[first[cluster][:, None] + corners]
-    np.testing.assert_array_equal(found, mesh.unit_vertices[mesh.faces[triangles]])
-    assert (first[cluster][:, None] + corners < first[cluster + 1][:, None]).all()
-    assert len(points) == first[-1]
+    points = view.points.numpy().reshape(-1, 3, LANES).transpose(0, 2, 1).reshape(-1, 3)
+    corners = view.corners.numpy().reshape(-1, 3, SIZE).transpose(0, 2, 1)
+    assert len(corners) == len(first) - 1 == -(-len(triangles) // SIZE) and len(points) == LANES * first[-1]
+    assert (corners < LANES * np.diff(first)[:, None, None]).all()
+    found = points[LANES * first[:-1, None, None] + corners].reshape(-1, 3, 3)
+    np.testing.assert_array_equal(found[: len(triangles)], mesh.unit_vertices[mesh.faces[triangles]])
 
 
 @pytest.mark.parametrize("name", meshes())
 def test_a_box_is_about_all_that_is_in_it(name: str) -> None:
     mesh = meshes()[name]
     view = clustered(mesh, launch.resolve_device("cpu"))
-    triangles, low, high, first = (getattr(view, field).numpy() for field in ("triangles", "low", "high", "first_box"))
+    triangles, first = view.triangles.numpy(), view.first_node.numpy()
+    boxes = view.boxes.numpy().reshape(-1, 2, 3, LANES).transpose(0, 3, 1, 2)
     corners = mesh.unit_vertices[mesh.faces[triangles]]
-    span = SIZE
+    count, span = -(-len(triangles) // SIZE), SIZE
     for level in range(len(first) - 1):
-        count = -(-len(triangles) // span)
-        assert first[level + 1] - first[level] == count
-        for k in range(count):
-            inside = corners[span * k : span * (k + 1)].reshape(-1, 3)
-            np.testing.assert_array_equal(low[first[level] + k], inside.min(axis=0))
-            np.testing.assert_array_equal(high[first[level] + k], inside.max(axis=0))
-        span *= CHILD
-    assert first[-1] - first[-2] == 1 and len(low) == first[-1]
+        inside = boxes[first[level] : first[level + 1]].reshape(-1, 2, 3)
+        assert first[level + 1] - first[level] == -(-count // LANES)
+        for k in range(len(inside)):
+            part = corners[span * min(k, count - 1) :][:span].reshape(-1, 3)
+            np.testing.assert_array_equal(inside[k], [part.min(axis=0), part.max(axis=0)])
+        count, span = -(-count // LANES), LANES * span
+    assert count == 1 and len(boxes) == first[-1]
 
 
 def test_clusters_are_of_neighbours() -> None:
@@ -61,6 +60,6 @@ def test_clusters_are_of_neighbours() -> None:
     knot = shapes.make("torus_knot", {"segments": [200, 24]})
     shuffled = Mesh(knot.vertices, np.random.default_rng(1).permutation(knot.faces))
     view = clustered(shuffled, launch.resolve_device("cpu"))
-    count = view.first_box.numpy()[1]
-    sides = (view.high.numpy() - view.low.numpy())[:count].max(axis=1)
-    assert np.median(sides) < 0.2 and view.points.shape[0] < 1.1 * len(knot.faces)
+    boxes = view.boxes.numpy().reshape(-1, 2, 3, LANES)[: view.first_node.numpy()[1]]
+    sides = (boxes[:, 1] - boxes[:, 0]).max(axis=1)
+    assert np.median(sides) < 0.2 and LANES * view.first_group.numpy()[-1] < 1.4 * len(knot.faces)
