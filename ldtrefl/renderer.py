@@ -28,7 +28,7 @@ from ldtrefl.frame.skip_options import skip_options_of
 from ldtrefl.frame.visibility import BAND_PIXELS, draw_gbuffer, draw_in_bands
 from ldtrefl.methods import find_method
 from ldtrefl.methods.base import RaylessMethod, RayMethod
-from ldtrefl.scene.description import Camera, Scene, Vector
+from ldtrefl.scene.description import Camera, Object, Scene, Vector
 from ldtrefl.tracing.nothing import shadow_tracer
 from ldtrefl.tracing.tracer import BoundTracer
 from ldtrefl.world.device_scene import DeviceScene
@@ -77,6 +77,9 @@ class Renderer:
         self._skip = skip_options_of(config.skip)
         device_scene = DeviceScene(scene, launch.resolve_device(device), skip_attributes=self._skip.attributes)
         self._device_scene = device_scene
+        """As it stood when it was last needed."""
+        self._changed: dict[int, Object] = {}
+        """The objects that have changed since, by number: the scene is made anew once for all of them."""
         self._tracer = kind.scene_tracer(config)
         """Answers the rays of methods that have any, and the shadow rays of every method."""
         self._method = kind(device_scene, config, self._tracer)
@@ -87,7 +90,7 @@ class Renderer:
     @property
     def scene(self) -> Scene:
         """What is rendered, moves included."""
-        return self._device_scene.scene
+        return self._as_it_stands().scene
 
     def move(
         self,
@@ -107,7 +110,8 @@ class Renderer:
         given = {"translate": translate, "rotate": rotate, "scale": scale}
         changes = {key: value for key, value in given.items() if value is not None}
         with self._lock:
-            self._go_on_with(self._device_scene.scene.with_object(name, **changes))
+            number, entry = self._object_called(name)
+            self._changed[number] = entry.changed(**changes)
 
     def update_vertices(self, name: str, vertices: ArrayLike) -> None:
         """Deform the object called ``name``: its mesh gets these vertices, for the same faces.
@@ -123,12 +127,24 @@ class Renderer:
             InputError: an unknown object, more or fewer vertices, or one that is not finite.
         """
         with self._lock:
-            self._go_on_with(self._device_scene.scene.with_vertices(name, vertices))
+            number, entry = self._object_called(name)
+            self._changed[number] = entry.deformed(vertices)
 
-    def _go_on_with(self, scene: Scene) -> None:
-        """Take a scene that comes from this one by a change of an object."""
-        before = self._device_scene
-        self._device_scene = DeviceScene(scene, before.device, before, skip_attributes=self._skip.attributes)
+    def _object_called(self, name: str) -> tuple[int, Object]:
+        """The number of the object called ``name``, and the object as it is now."""
+        scene = self._device_scene.scene
+        number = scene.number_of(name)
+        return number, self._changed.get(number, scene.objects[number])
+
+    def _as_it_stands(self) -> DeviceScene:
+        """The scene on the device, all changes included."""
+        with self._lock:
+            if self._changed:
+                before = self._device_scene
+                scene, kept = before.scene.with_objects(self._changed), self._skip.attributes
+                self._device_scene = DeviceScene(scene, before.device, before, skip_attributes=kept)
+                self._changed = {}
+            return self._device_scene
 
     def render(self, camera: Camera | None = None) -> Frame:
         """Render a frame, seen by ``camera`` or else by the scene's own.
@@ -156,7 +172,7 @@ class Renderer:
 
     def _looking_from(self, camera: Camera) -> DeviceScene:
         """The scene as it stands, ready for a frame."""
-        scene = self._device_scene
+        scene = self._as_it_stands()
         scene.look_from(camera)
         if self._method.scene is not scene:
             self._method.place(scene)
@@ -180,7 +196,7 @@ class Renderer:
         return Frame(image, stats, WholeFrame.of(parts))
 
     def _in_bands(self, camera: Camera) -> Frame:
-        scene, stats = self._device_scene, Stats()
+        scene, stats = self._as_it_stands(), Stats()
         image = np.empty((camera.height, camera.width, 3), np.float32)
         mask = np.empty((camera.height, camera.width), bool)
         for parts in self._bands(camera, stats):
@@ -264,7 +280,7 @@ class Renderer:
 
     def texel_sizes(self, resolution: int) -> np.ndarray:
         """(objects,) length in the world of a texel of each object's maps at ``resolution``."""
-        return np.array([entry.longest_side / resolution for entry in self._device_scene.objects])
+        return np.array([entry.longest_side / resolution for entry in self._as_it_stands().objects])
 
 
 def render(scene: Scene, method: str | None = None, device: str | None = None, **options: object) -> Frame:

@@ -113,12 +113,53 @@ def test_a_move_that_fails_leaves_all_as_it_was(monkeypatch: pytest.MonkeyPatch)
     def fail(*_arguments: Any, **_named: Any) -> None:
         raise Stop
 
-    monkeypatch.setattr(renderer_module, "DeviceScene", fail)
+    monkeypatch.setattr(Object, "changed", fail)
     with pytest.raises(Stop):
         renderer.move("torus", translate=(1.0, 0.0, 0.0))
     monkeypatch.undo()
     assert renderer.scene.objects == scene().objects
     assert difference(renderer.render(), before) == ""
+    # Of a move that counts the way to the device is tried again.
+    renderer.move("torus", translate=(1.0, 0.0, 0.0))
+    monkeypatch.setattr(renderer_module, "DeviceScene", fail)
+    with pytest.raises(Stop):
+        renderer.render()
+    monkeypatch.undo()
+    assert_as_fresh(renderer, renderer.render())
+
+
+def test_changes_between_two_frames_add_up() -> None:
+    renderer = ldtrefl.Renderer(scene(), "ldt")
+    renderer.render()
+    renderer.move("torus", translate=(9.0, 0.0, 0.0))
+    renderer.move("knot", translate=(1.2, -1.4, 0.3))
+    renderer.move("torus", scale=0.3)
+    given = scene().objects[scene().number_of("torus")].geometry.vertices
+    renderer.update_vertices("torus", 1.1 * given)
+    renderer.move("torus", translate=(-1.2, -1.4, 0.1))
+    torus = renderer.scene.objects[renderer.scene.number_of("torus")]
+    assert torus.scale == 0.3 and torus.translate == (-1.2, -1.4, 0.1)
+    np.testing.assert_array_equal(torus.geometry.vertices, 1.1 * given)
+    assert_as_fresh(renderer, renderer.render())
+
+
+def test_a_scene_goes_to_the_device_once_for_all_that_moved(monkeypatch: pytest.MonkeyPatch) -> None:
+    renderer, made = ldtrefl.Renderer(scene(), "bvh"), []
+    whole = renderer_module.DeviceScene
+    monkeypatch.setattr(renderer_module, "DeviceScene", lambda *a, **n: made.append(a) or whole(*a, **n))
+    for k in range(5):
+        renderer.move("torus", translate=(0.1 * k, -1.5, 0.0))
+        renderer.move("knot", scale=0.3 + 0.1 * k)
+    assert made == []
+    renderer.render()
+    renderer.render()
+    assert len(made) == 1
+
+
+def test_a_move_to_a_size_that_is_not_allowed_names_the_object() -> None:
+    renderer = ldtrefl.Renderer(scene(objects=(Object(name="a", shape="box", fit=1e15),)), "bvh")
+    with pytest.raises(ldtrefl.InputError, match=r"^object 'a': fit 1e\+15, scale 10.0 and the mesh's own size of 2"):
+        renderer.move("a", scale=10.0)
 
 
 def test_the_launches_of_a_frame_do_not_depend_on_the_number_of_objects(monkeypatch: pytest.MonkeyPatch) -> None:

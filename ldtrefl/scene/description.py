@@ -39,7 +39,7 @@ from ldtrefl.base.notices import warn_once
 from ldtrefl.files.picture_reading import stored_picture
 from ldtrefl.files.stored_picture import StoredPicture
 from ldtrefl.scene import shapes
-from ldtrefl.scene.layout import Layout
+from ldtrefl.scene.layout import Layout, share_geometries
 from ldtrefl.scene.mesh import Mesh
 from ldtrefl.scene.placement import placement
 from ldtrefl.scene.readers.mesh_files import load_mesh
@@ -227,9 +227,39 @@ class Object:
         return self.mesh if isinstance(self.mesh, Mesh) else load_mesh(str(self.mesh))
 
     def share_geometry(self, mesh: Mesh) -> None:
-        """Take the mesh that an object of the same ``mesh``, or ``shape`` and ``params``, has made: it is then neither
-        made nor counted again."""
+        """Take the mesh of an object of the same file or shape: it is then neither made nor counted again."""
         object.__setattr__(self, "geometry", mesh)
+
+    def changed(self, **changes: object) -> Object:
+        """The same object with other values for some fields.
+
+        Raises:
+            InputError: an unknown field, or a value that is not allowed.
+        """
+        known = {entry.name for entry in dataclasses.fields(Object)}
+        values: dict[str, Any] = changes  # pydantic checks them
+        for field in sorted(changes.keys() - known):
+            raise unknown_name("field of an object", field, known)
+        try:
+            changed = dataclasses.replace(self, **values)
+            if not {"mesh", "shape", "params"} & set(changes):
+                changed.share_geometry(self.geometry)
+            changed.world_from_object()  # refuses sizes that are not allowed
+        except InputError as error:
+            raise error.within(f"object '{self.name}'") from None
+        return changed
+
+    def deformed(self, vertices: ArrayLike) -> Object:
+        """The same object with these (n, 3) vertices, for the same faces.
+
+        Raises:
+            InputError: more or fewer vertices than it has, or one that is not finite.
+        """
+        try:
+            mesh = self.geometry.with_vertices(vertices)
+        except InputError as error:
+            raise error.within(f"object '{self.name}'") from None
+        return self.changed(mesh=mesh, shape=None, params={})
 
     @property
     def texture(self) -> StoredPicture | None:
@@ -252,22 +282,6 @@ class Object:
     @functools.cached_property
     def _world_from_object(self) -> np.ndarray:
         return placement(self.geometry.fit_bounds, self.fit, self.scale, self.rotate, self.translate)
-
-
-PLACED_BY = ("geometry", "fit", "scale", "rotate", "translate")
-"""The fields of an object that say where it stands."""
-
-
-def _share_geometries(objects: tuple[Object, ...]) -> None:
-    """Give the objects that have no mesh yet theirs, one for all that name the same file, or shape and parameters."""
-    made: dict[tuple[str | None, str | Mesh | None, str], Mesh] = {}
-    for entry in objects:
-        if "geometry" not in vars(entry):
-            source = entry.shape, entry.mesh, repr(entry.params)
-            if source in made:
-                entry.share_geometry(made[source])
-            else:
-                made[source] = entry.geometry
 
 
 @refusing_in_one_line
@@ -309,9 +323,9 @@ class Scene:
         Raises:
             InputError: a mesh cannot be had, or an object's size is not allowed.
         """
-        _share_geometries(self.objects)
-        fields = [[getattr(entry, name) for entry in self.objects] for name in PLACED_BY]
-        layout = Layout.of(*fields)
+        share_geometries(self.objects)
+        names = ("geometry", "fit", "scale", "rotate", "translate")
+        layout = Layout.of(*([getattr(entry, name) for entry in self.objects] for name in names))
         for number in layout.wrong:
             try:
                 self.objects[number].world_from_object()
@@ -360,20 +374,7 @@ class Scene:
             InputError: an unknown object or field, or a value that is not allowed.
         """
         number = self.number_of(name)
-        known = {entry.name for entry in dataclasses.fields(Object)}
-        values: dict[str, Any] = changes  # pydantic checks them
-        for field in changes:
-            if field not in known:
-                raise unknown_name("field of an object", field, known)
-        try:
-            changed = dataclasses.replace(self.objects[number], **values)
-        except InputError as error:
-            raise error.within(f"object '{name}'") from None
-        if not {"mesh", "shape", "params"} & set(changes):
-            changed.share_geometry(self.objects[number].geometry)
-        objects = (*self.objects[:number], changed, *self.objects[number + 1 :])
-        layout = self.layout.with_object(number, changed.geometry, changed.world_from_object())
-        return self._laid_out_alike(dataclasses.replace(self, objects=objects), layout)
+        return self.with_objects({number: self.objects[number].changed(**changes)})
 
     def with_vertices(self, name: str, vertices: ArrayLike) -> Scene:
         """The same scene with the mesh of the object called ``name`` deformed: (n, 3) vertices, for the same faces.
@@ -381,12 +382,16 @@ class Scene:
         Raises:
             InputError: an unknown object, more or fewer vertices than it has, or one that is not finite.
         """
-        entry = self.objects[self.number_of(name)]
-        try:
-            mesh = entry.geometry.with_vertices(vertices)
-        except InputError as error:
-            raise error.within(f"object '{name}'") from None
-        return self.with_object(name, mesh=mesh, shape=None, params={})
+        number = self.number_of(name)
+        return self.with_objects({number: self.objects[number].deformed(vertices)})
+
+    def with_objects(self, changed: Mapping[int, Object]) -> Scene:
+        """The same scene with objects in the place of those of some numbers, each made from that one."""
+        objects = list(self.objects)
+        for number, entry in changed.items():
+            objects[number] = entry
+        placed = {number: (entry.geometry, entry.world_from_object()) for number, entry in changed.items()}
+        return self._laid_out_alike(dataclasses.replace(self, objects=tuple(objects)), self.layout.with_objects(placed))
 
     @property
     def environment_image(self) -> StoredPicture | None:

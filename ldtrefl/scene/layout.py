@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
+from typing import Protocol
 
 import numpy as np
 
@@ -14,6 +15,36 @@ from ldtrefl.scene.placement import placements, wrong_sizes
 
 CORNERS = np.array(np.meshgrid([0, 1], [0, 1], [0, 1])).reshape(3, -1).T
 """(8, 3): of a box's corners, along each axis 0 for its low and 1 for its high side."""
+
+
+class _HasGeometry(Protocol):
+    """An object of a scene (``description.py``)."""
+
+    @property
+    def shape(self) -> str | None: ...
+
+    @property
+    def mesh(self) -> str | Mesh | None: ...
+
+    @property
+    def params(self) -> Mapping[str, object]: ...
+
+    @property
+    def geometry(self) -> Mesh: ...
+
+    def share_geometry(self, mesh: Mesh) -> None: ...
+
+
+def share_geometries(objects: Sequence[_HasGeometry]) -> None:
+    """Give the objects that have no mesh yet theirs, one for all that name the same file, or shape and parameters."""
+    made: dict[tuple[str | None, str | Mesh | None, str], Mesh] = {}
+    for entry in objects:
+        if "geometry" not in vars(entry):
+            source = entry.shape, entry.mesh, repr(entry.params)
+            if source in made:
+                entry.share_geometry(made[source])
+            else:
+                made[source] = entry.geometry
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,17 +81,17 @@ class Layout:
         """Numbers of the objects whose size along an axis is not allowed."""
         return wrong_sizes(self.world_from_object, self._bounds[self.mesh_of])
 
-    def with_object(self, number: int, mesh: Mesh, world_from_object: np.ndarray) -> Layout:
-        """The same but for one object."""
-        meshes, mesh_of = self.meshes, self.mesh_of
-        before = mesh_of[number]
-        if mesh is not meshes[before] and np.count_nonzero(mesh_of == before) == 1:
-            meshes = (*meshes[:before], mesh, *meshes[before + 1 :])  # nothing else has the mesh of before
-        elif mesh is not meshes[before]:
-            meshes, mesh_of = (*meshes, mesh), mesh_of.copy()
-            mesh_of[number] = len(meshes) - 1
-        matrices = self.world_from_object.copy()
-        matrices[number] = world_from_object
+    def with_objects(self, changed: Mapping[int, tuple[Mesh, np.ndarray]]) -> Layout:
+        """The same but for some objects, given the number, the mesh and ``world_from_object`` of each."""
+        meshes, mesh_of, matrices = self.meshes, self.mesh_of, self.world_from_object.copy()
+        for number, (mesh, world_from_object) in changed.items():
+            matrices[number] = world_from_object
+            before = mesh_of[number]
+            if mesh is not meshes[before] and np.count_nonzero(mesh_of == before) == 1:
+                meshes = (*meshes[:before], mesh, *meshes[before + 1 :])  # nothing else has the mesh of before
+            elif mesh is not meshes[before]:
+                meshes, mesh_of = (*meshes, mesh), mesh_of.copy()
+                mesh_of[number] = len(meshes) - 1
         return Layout(meshes, mesh_of, matrices)
 
     def has_meshes_of(self, other: Layout) -> bool:

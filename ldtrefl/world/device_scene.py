@@ -16,7 +16,7 @@ import numpy as np
 import warp as wp
 
 from ldtrefl.base.errors import InputError
-from ldtrefl.device.struct_arrays import copy_structs, host_structs
+from ldtrefl.device.struct_arrays import host_structs
 from ldtrefl.files.srgb import linear_of_bytes
 from ldtrefl.scene.description import Camera, Scene
 from ldtrefl.world.bounding_spheres import bounding_radii
@@ -110,7 +110,7 @@ class DeviceScene:
         self.world_from_unit, self.spheres = before.world_from_unit.copy(), before.spheres.copy()
         self._stamps = np.where(is_changed, next(_STAMPS), before._stamps)
         made, self._records = host_structs(len(self.mesh_of), ObjectRecord)
-        copy_structs(before._records, np.arange(len(self.mesh_of)), self._records)
+        np.copyto(self._records.view(np.uint8), before._records.view(np.uint8))
         looks = [k for k in changed if now[k].material is not then[k].material or now[k].smooth != then[k].smooth]
         if looks:
             self._fill(np.array(looks))
