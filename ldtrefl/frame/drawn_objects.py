@@ -66,17 +66,17 @@ def _may_be_seen(scene: DeviceScene, camera: Camera, spheres: np.ndarray) -> tup
     """Whether (n, 4) spheres of device space may cover a pixel's centre, (n,) bool; and the depths of their centres."""
     eye = (scene.device_from_world @ [*camera.eye, 1.0])[:3]
     # Not by a matrix product: the threads of BLAS go on spinning for a frame's length and take the cores of ours.
-    x, y, depth = np.einsum("ij,kj->ik", np.array(camera_axes(camera)), spheres[:, :3] - eye)
-    radius = spheres[:, 3]
+    placed, radius = np.einsum("ij,kj->ik", np.array(camera_axes(camera)), spheres[:, :3] - eye), spheres[:, 3]
+    aside, depth = placed[:2], placed[2]
     half_height = np.tan(np.radians(camera.fov_y) / 2.0)
-    half_width = half_height * camera.width / camera.height
+    half = np.array([[half_height * camera.width / camera.height], [half_height]])
+    pixels = np.array([[camera.width], [camera.height]])
     seen = depth > -radius
-    for aside, half, pixels in ((x, half_width, camera.width), (y, half_height, camera.height)):
-        seen &= np.abs(aside) - half * depth <= radius * np.sqrt(1.0 + half**2)
-        with np.errstate(all="ignore"):  # what is not wholly in front of the camera has no bounds
-            middle = aside / depth
-            reach = radius * np.sqrt(1.0 + middle**2) / (depth - radius)
-            low, high = (0.5 * pixels * (1.0 + bound / half) for bound in (middle - reach, middle + reach))
-            between = np.floor(high + CENTRE_SLACK - 0.5) < np.ceil(low - CENTRE_SLACK - 0.5)
-        seen &= ~(between & (depth > radius))
+    seen &= (np.abs(aside) - half * depth <= radius * np.sqrt(1.0 + half**2)).all(axis=0)
+    with np.errstate(all="ignore"):  # what is not wholly in front of the camera has no bounds
+        middle = aside / depth
+        reach = radius * np.sqrt(1.0 + middle**2) / (depth - radius)
+        low, high = (0.5 * pixels * (1.0 + bound / half) for bound in (middle - reach, middle + reach))
+        between = np.floor(high + CENTRE_SLACK - 0.5) < np.ceil(low - CENTRE_SLACK - 0.5)
+    seen &= ~(between.any(axis=0) & (depth > radius))
     return seen, depth

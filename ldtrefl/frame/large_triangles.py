@@ -27,8 +27,7 @@ class LargeTriangles:
     """Triangles that are set aside."""
 
     count: wp.array(dtype=wp.int32)  # (1,) how many, those that found no room counted in
-    place: wp.array(dtype=wp.int32)  # of the object among those drawn
-    triangle: wp.array(dtype=wp.int32)  # its number in the object
+    found: wp.array(dtype=wp.vec2i)  # of each the place of its object among those drawn, and its number in the object
 
 
 @wp.func
@@ -38,9 +37,8 @@ def draw_or_set_aside(target: Target, triangle: Triangle, place: int, index: int
     if box.first_x <= box.last_x and box.first_y <= box.last_y:
         if (box.last_x - box.first_x + 1) * (box.last_y - box.first_y + 1) >= LARGE_BOX:
             k = take_place(large.count)
-            if k < large.place.shape[0]:
-                large.place[k] = place
-                large.triangle[k] = index
+            if k < large.found.shape[0]:
+                large.found[k] = wp.vec2i(place, index)
                 return
         draw_rows(target, triangle, box, box.first_y, box.last_y)
 
@@ -60,14 +58,14 @@ def draw_large_triangles(
     """Draw one strip of rows of a large triangle."""
     i = first + wp.tid()
     strips = (target.end_row - target.first_row + STRIP - 1) / STRIP
-    k = i / strips
-    one = drawn[large.place[k]]
-    face = objects[one.object].faces[large.triangle[k]]
+    found = large.found[i / strips]
+    one = drawn[found[0]]
+    face = objects[one.object].faces[found[1]]
     triangle = Triangle()
     triangle.a = corner_of(one, objects, corners, face[0])
     triangle.b = corner_of(one, objects, corners, face[1])
     triangle.c = corner_of(one, objects, corners, face[2])
-    triangle.number = number_of(numbers, one.object, large.triangle[k])
+    triangle.number = number_of(numbers, one.object, found[1])
     box = pixel_box(triangle.a, triangle.b, triangle.c, target.width, target.first_row, target.end_row)
     strip = target.first_row + STRIP * (i % strips)
     draw_rows(target, triangle, box, wp.max(box.first_y, strip), wp.min(box.last_y, strip + STRIP - 1))
@@ -77,7 +75,7 @@ def none_set_aside(device: wp.Device) -> LargeTriangles:
     """Room for large triangles."""
     large = LargeTriangles()
     large.count = wp.zeros(1, dtype=wp.int32, device=device)
-    large.place, large.triangle = (wp.empty(ROOM, dtype=wp.int32, device=device) for _ in range(2))
+    large.found = wp.empty(ROOM, dtype=wp.vec2i, device=device)
     return large
 
 

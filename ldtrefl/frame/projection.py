@@ -30,14 +30,6 @@ class DrawnObject:
     row_z: wp.vec4d
 
 
-@wp.struct
-class Chunks:
-    """Vertices or triangles of the objects that are drawn, up to ``CHUNK`` of one object in each."""
-
-    place: wp.array(dtype=wp.int32)  # of the object among those drawn
-    begin: wp.array(dtype=wp.int32)  # the chunk's first vertex or triangle in the object
-
-
 @wp.func
 def projected(drawn: DrawnObject, p: wp.vec3d) -> wp.vec3d:
     """A point of unit space as a corner: (x, y, 1 / depth) in pixels in front of the camera; elsewhere (x depth,
@@ -74,7 +66,7 @@ def homogeneous(corner: wp.vec3d) -> wp.vec3d:
 def project_vertices(
     first: int,
     # In:
-    chunks: Chunks,
+    chunks: wp.array(dtype=wp.vec2i),  # ``chunks_of`` vertices
     objects: wp.array(dtype=ObjectRecord),
     drawn: wp.array(dtype=DrawnObject),
     # Out:
@@ -82,10 +74,10 @@ def project_vertices(
 ):
     """Project the vertices of one chunk."""
     chunk = first + wp.tid()
-    one = drawn[chunks.place[chunk]]
+    one = drawn[chunks[chunk][0]]
     vertices = objects[one.object].vertices
     has_outliers = objects[one.object].exact_vertices.shape[0] > 0
-    i = int(chunks.begin[chunk])
+    i = int(chunks[chunk][1])
     end = wp.min(i + CHUNK, vertices.shape[0])
     while i < end:
         p = wp.vec3d(wp.float64(vertices[i][0]), wp.float64(vertices[i][1]), wp.float64(vertices[i][2]))
@@ -95,13 +87,10 @@ def project_vertices(
         i += 1
 
 
-def chunks_of(counts: np.ndarray, device: wp.Device) -> tuple[Chunks, int]:
-    """(``Chunks``, how many) of objects that have so many vertices or triangles each."""
+def chunks_of(counts: np.ndarray, device: wp.Device) -> wp.array:
+    """(chunks,) vec2i: the vertices or triangles of objects that have so many each, up to ``CHUNK`` of one object in
+    each. The place of the object among these, and the chunk's first vertex or triangle in it."""
     chunks = -(-counts // int(CHUNK))
     place = np.repeat(np.arange(len(counts)), chunks)
     begin = int(CHUNK) * (np.arange(len(place)) - np.repeat(np.cumsum(chunks) - chunks, chunks))
-    made = Chunks()
-    made.place, made.begin = (
-        wp.array(values.astype(np.int32), dtype=wp.int32, device=device) for values in (place, begin)
-    )
-    return made, len(place)
+    return wp.array(np.stack([place, begin], axis=1).astype(np.int32), dtype=wp.vec2i, device=device)

@@ -38,16 +38,6 @@ PIXELS_IN_A_ROW = 16
 """Pixels that one thread of a CPU finds: neighbours often see the same triangle, which is then projected once."""
 
 
-@wp.struct
-class Resolved:
-    """What pixels see."""
-
-    object: wp.array(dtype=wp.int32)
-    triangle: wp.array(dtype=wp.int32)
-    barycentrics: wp.array(dtype=wp.vec2)
-    reflector: wp.array(dtype=wp.uint8)
-
-
 @wp.func
 def number_in(key: wp.int64) -> int:
     """The number that leads back to a triangle."""
@@ -113,7 +103,7 @@ def resolve_pixels(
     first_row: int,
     run: int,
     # Out, the reflectors 0 before:
-    resolved: Resolved,
+    seen: GBufferView,
 ):
     """Find which point of which triangle each pixel of a run sees, from its key."""
     begin = run * (first + wp.tid())
@@ -121,9 +111,9 @@ def resolve_pixels(
     i = int(begin)
     while i < end:
         if keys[i] == wp.int64(0):
-            resolved.object[i] = -1
-            resolved.triangle[i] = -1
-            resolved.barycentrics[i] = wp.vec2(0.0, 0.0)
+            seen.object[i] = -1
+            seen.triangle[i] = -1
+            seen.barycentrics[i] = wp.vec2(0.0, 0.0)
             i += 1
         else:
             number = number_in(keys[i])
@@ -142,10 +132,10 @@ def resolve_pixels(
                 pixel = pixel_of(i, width, first_row)
                 at = perspective_weights(tri, pixel[0], pixel[1])
                 total = at[0] + at[1] + at[2]
-                resolved.object[i] = index
-                resolved.triangle[i] = triangle
-                resolved.barycentrics[i] = wp.vec2(float(at[1] / total), float(at[2] / total))
-                resolved.reflector[i] = is_mirror
+                seen.object[i] = index
+                seen.triangle[i] = triangle
+                seen.barycentrics[i] = wp.vec2(float(at[1] / total), float(at[2] / total))
+                seen.reflector[i] = is_mirror
                 i += 1
                 more = i < end and numbers.shift == 0
                 if more:
@@ -155,21 +145,21 @@ def resolve_pixels(
 def resolved(drawing: Drawing, scene: DeviceScene) -> GBuffer:
     """The G-buffer of what was drawn: which point of which triangle each pixel sees."""
     device, camera, pixels = scene.device, drawing.camera, drawing.keys.shape[0]
-    view, out = GBufferView(), Resolved()
+    view = GBufferView()
     view.object, view.triangle = (wp.empty(pixels, dtype=wp.int32, device=device) for _ in range(2))
     view.barycentrics = wp.empty(pixels, dtype=wp.vec2, device=device)
     view.reflector = wp.zeros(pixels, dtype=wp.uint8, device=device)
     view.camera = camera_view(camera, scene.device_from_world, drawing.band)
-    out.object, out.triangle, out.barycentrics = view.object, view.triangle, view.barycentrics
-    out.reflector = view.reflector
-    drawn = DrawnObjects.joined([objects for objects, _ in drawing.drawn])
-    first_corners = np.concatenate([first for _, first in drawing.drawn])
+    objects = DrawnObjects.joined([part.objects for part in drawing.drawn])
+    drawn = drawing.drawn[0].drawn if len(drawing.drawn) == 1 else None
+    if drawn is None:
+        drawn = objects.on_device(np.concatenate([part.first_corners for part in drawing.drawn]), device)
     place_of = np.full(len(scene.objects), -1, np.int32)
-    place_of[drawn.numbers] = np.arange(len(drawn.numbers))
+    place_of[objects.numbers] = np.arange(len(objects.numbers))
     places = wp.array(place_of, dtype=wp.int32, device=device)
     run = PIXELS_IN_A_ROW if device.is_cpu else 1
-    known = [scene.records, drawn.on_device(first_corners, device), places, scene.triangle_numbers]
-    inputs = [drawing.keys, *known, drawing.room.corners, camera.width, drawing.band.first_row, run, out]
+    known = [scene.records, drawn, places, scene.triangle_numbers]
+    inputs = [drawing.keys, *known, drawing.room.corners, camera.width, drawing.band.first_row, run, view]
     launch.launch(resolve_pixels, -(-pixels // run), inputs, device)
     return GBuffer(scene, camera, view, drawing.band)
 

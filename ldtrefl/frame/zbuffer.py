@@ -18,7 +18,7 @@ from ldtrefl.device.bins import CHUNK
 from ldtrefl.frame.drawn_objects import DrawnObjects
 from ldtrefl.frame.instances import draw_all_instances, instances_among
 from ldtrefl.frame.large_triangles import LargeTriangles, draw_or_set_aside, draw_those_set_aside, none_set_aside
-from ldtrefl.frame.projection import Chunks, DrawnObject, chunks_of, project_vertices
+from ldtrefl.frame.projection import DrawnObject, chunks_of, project_vertices
 from ldtrefl.frame.triangle_rows import Target, Triangle
 from ldtrefl.scene.description import Camera
 from ldtrefl.world.camera import Band
@@ -39,7 +39,7 @@ have more."""
 def draw_triangles(
     first: int,
     # In:
-    chunks: Chunks,
+    chunks: wp.array(dtype=wp.vec2i),  # ``chunks_of`` triangles
     objects: wp.array(dtype=ObjectRecord),
     drawn: wp.array(dtype=DrawnObject),
     numbers: TriangleNumbers,
@@ -50,11 +50,11 @@ def draw_triangles(
 ):
     """Draw the triangles of one chunk, but set those aside whose boxes are large."""
     chunk = first + wp.tid()
-    place = chunks.place[chunk]
+    place = chunks[chunk][0]
     index = drawn[place].object
     first_corner = drawn[place].first_corner
     faces = objects[index].faces
-    i = int(chunks.begin[chunk])
+    i = int(chunks[chunk][1])
     end = wp.min(i + CHUNK, faces.shape[0])
     while i < end:
         triangle = Triangle()
@@ -90,6 +90,17 @@ class CornerRoom:
         return len(self.first) == 0 or self.first[0] >= 0
 
 
+@dataclass(frozen=True, eq=False)
+class DrawnPart:
+    """Objects that were drawn together."""
+
+    objects: DrawnObjects
+    first_corners: np.ndarray
+    """(n,) the place of each object's first corner, -1 if its corners are not kept."""
+    drawn: wp.array | None
+    """(n,) ``DrawnObject``, if they were drawn at once."""
+
+
 class Drawing:
     """A z-buffer of a band of an image, and what was drawn in it."""
 
@@ -100,8 +111,8 @@ class Drawing:
         self.room = room
         self.keys = wp.zeros(camera.width * band.rows, dtype=wp.int64, device=room.corners.device)
         """(h * w,) int64: nearness of what a pixel sees, then its triangle's number; 0 where nothing is seen."""
-        self.drawn: list[tuple[DrawnObjects, np.ndarray]] = []
-        """What was drawn, and the place of each object's first corner, -1 if its corners are not kept."""
+        self.drawn: list[DrawnPart] = []
+        """What was drawn."""
 
     def over(self) -> Drawing:
         """A copy to draw other objects over."""
@@ -113,36 +124,41 @@ class Drawing:
     def draw(self, scene: DeviceScene, objects: DrawnObjects, *, are_projected: bool = False) -> None:
         """Draw objects; ``are_projected`` says that corners that are kept are in the room already."""
         are_instances = instances_among(scene, self.camera, objects)
+        if not are_instances.any():
+            self._draw_apart(scene, objects, are_projected=are_projected)
+            return
         self._draw_apart(scene, objects.some(~are_instances), are_projected=are_projected)
-        if are_instances.any():
-            instances = objects.some(are_instances)
-            self.drawn.append((instances, np.full(len(instances.numbers), -1)))
-            draw_all_instances(scene, instances, self._target())
+        instances = objects.some(are_instances)
+        self.drawn.append(DrawnPart(instances, np.full(len(instances.numbers), -1), None))
+        draw_all_instances(scene, instances, self._target())
 
     def _draw_apart(self, scene: DeviceScene, objects: DrawnObjects, *, are_projected: bool) -> None:
         """Draw objects that are not instances."""
-        counts, room = scene.vertex_counts[objects.numbers], self.room
-        self.drawn.append((objects, room.first[objects.numbers]))
-        if room.keeps:
-            self._draw(scene, objects, room.corners, room.first[objects.numbers], are_projected=are_projected)
+        first, device = self.room.first[objects.numbers], scene.device
+        if self.room.keeps:
+            drawn = objects.on_device(first, device)
+            self.drawn.append(DrawnPart(objects, first, drawn))
+            self._draw(scene, objects.numbers, drawn, self.room.corners, are_projected=are_projected)
             return
-        for part, of_part in _parts(counts):
-            corners = wp.empty(int(of_part.sum()), dtype=wp.vec3d, device=scene.device)
-            self._draw(scene, objects.some(part), corners, np.cumsum(of_part) - of_part, are_projected=False)
+        self.drawn.append(DrawnPart(objects, first, None))
+        for part, counts in _parts(scene.vertex_counts[objects.numbers]):
+            corners = wp.empty(int(counts.sum()), dtype=wp.vec3d, device=device)
+            drawn = objects.some(part).on_device(np.cumsum(counts) - counts, device)
+            self._draw(scene, objects.numbers[part], drawn, corners, are_projected=False)
 
     def _draw(
-        self, scene: DeviceScene, objects: DrawnObjects, corners: wp.array, first: np.ndarray, *, are_projected: bool
+        self, scene: DeviceScene, numbers: np.ndarray, drawn: wp.array, corners: wp.array, *, are_projected: bool
     ) -> None:
-        """Draw objects whose corners have their places from ``first`` on."""
-        device, drawn = scene.device, objects.on_device(first, scene.device)
+        """Draw the objects of these numbers, for whose corners there is room."""
+        device, records = scene.device, scene.records
         if not are_projected:
-            chunks, count = chunks_of(scene.vertex_counts[objects.numbers], device)
-            launch.launch(project_vertices, count, [chunks, scene.records, drawn, corners], device)
-        chunks, count = chunks_of(scene.triangle_counts[objects.numbers], device)
-        target, large, numbers = self._target(), none_set_aside(device), scene.triangle_numbers
-        inputs = [chunks, scene.records, drawn, numbers, corners, target, large]
-        launch.launch(draw_triangles, count, inputs, device)
-        draw_those_set_aside(large, scene.records, drawn, numbers, corners, target)
+            chunks = chunks_of(scene.vertex_counts[numbers], device)
+            launch.launch(project_vertices, chunks.shape[0], [chunks, records, drawn, corners], device)
+        chunks = chunks_of(scene.triangle_counts[numbers], device)
+        target, large = self._target(), none_set_aside(device)
+        inputs = [chunks, records, drawn, scene.triangle_numbers, corners, target, large]
+        launch.launch(draw_triangles, chunks.shape[0], inputs, device)
+        draw_those_set_aside(large, records, drawn, scene.triangle_numbers, corners, target)
 
     def _target(self) -> Target:
         """The z-buffer as kernels draw to it."""

@@ -124,14 +124,23 @@ class DeviceScene:
 
     def _fill(self, numbers: np.ndarray) -> None:
         """Fill in all but the places of the objects of these numbers."""
-        records, sources = self._records[numbers], [self.scene.objects[number] for number in numbers]
+        records, sources = self._rows(numbers), [self.scene.objects[number] for number in numbers]
         known = [self.meshes, self.mesh_of[numbers], self._decoded]
         fill_records(records, sources, *known, skip_attributes=self._skip_attributes)
-        self._records[numbers] = records
+        self._put_back(records, numbers)
+
+    def _rows(self, numbers: np.ndarray) -> np.ndarray:
+        """Records to fill in: those of all objects where they are, or copies of some."""
+        return self._records if len(numbers) == len(self._records) else self._records[numbers]
+
+    def _put_back(self, records: np.ndarray, numbers: np.ndarray) -> None:
+        """Store records that ``_rows`` gave."""
+        if records is not self._records:
+            self._records[numbers] = records
 
     def _place(self, numbers: np.ndarray) -> None:
         """Fill in the places of the objects of these numbers."""
-        mesh_of, records = self.mesh_of[numbers], self._records[numbers]
+        mesh_of, records = self.mesh_of[numbers], self._rows(numbers)
         frames = np.array([_object_from_unit(mesh) for mesh in self.meshes]).reshape(-1, 4, 4)
         world_from_unit = self.scene.layout.world_from_object[numbers] @ frames[mesh_of]
         device_from_unit = self.device_from_world @ world_from_unit
@@ -139,7 +148,7 @@ class DeviceScene:
         fill_places(records, device_from_unit, radii)
         self.world_from_unit[numbers] = world_from_unit
         self.spheres[numbers, :3], self.spheres[numbers, 3] = device_from_unit[:, :3, 3], radii
-        self._records[numbers] = records
+        self._put_back(records, numbers)
 
     @functools.cached_property
     def objects(self) -> DeviceObjects:

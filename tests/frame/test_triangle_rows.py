@@ -32,14 +32,14 @@ def drawn(corners: np.ndarray) -> np.ndarray:
     written = written.reshape(-1, 3)
     record = ObjectRecord()
     record.faces = wp.array(np.arange(3 * count).reshape(-1, 3), dtype=wp.vec3i, device=device)
-    chunks, chunk_count = chunks_of(np.array([count]), device)
+    chunks = chunks_of(np.array([count]), device)
     target, large = Target(), none_set_aside(device)
     target.keys = wp.zeros((END_ROW - FIRST_ROW) * WIDTH, dtype=wp.int64, device=device)
     target.width, target.first_row, target.end_row = WIDTH, FIRST_ROW, END_ROW
     objects = wp.array([record], dtype=ObjectRecord, device=device)
     drawn = wp.array([DrawnObject()], dtype=DrawnObject, device=device)
     known = [objects, drawn, numbered(np.array([count]), device), wp.array(written, dtype=wp.vec3d, device=device)]
-    launch.launch(draw_triangles, chunk_count, [chunks, *known, target, large], device)
+    launch.launch(draw_triangles, chunks.shape[0], [chunks, *known, target, large], device)
     assert large.count.numpy()[0] == 0 and WIDTH * (END_ROW - FIRST_ROW) < int(LARGE_BOX)
     return target.keys.numpy().reshape(END_ROW - FIRST_ROW, WIDTH)
 
