@@ -14,6 +14,7 @@ import warp as wp
 
 from ldtrefl.device.launch import kernel, launch
 from ldtrefl.frame.bounces import FollowedRays, LaterBounce, RayFollower
+from ldtrefl.frame.history import Reusable
 from ldtrefl.frame.regions import Regions
 from ldtrefl.frame.taken_rays import taken
 from ldtrefl.tracing.object_sets import RUN, ObjectSets, object_listed, rays_of, sets_for_runs
@@ -86,6 +87,19 @@ def changed_runs(
     inputs += [before.source_onwards, flags]
     launch(find_changed_runs, runs, inputs, device)
     return np.flatnonzero(flags.numpy())
+
+
+def followed_with_history(
+    follower: RayFollower, rays: RayBuffer, regions: Regions, reusable: Reusable | None
+) -> FollowedRays:
+    """Where rays end, taken from the last frame but for rays that may end elsewhere; all are followed if none of it
+    can be used, as with shadows, which what has moved may cast anywhere."""
+    before, scene = None if reusable is None else reusable.reflected.followed, follower.gbuffer.scene
+    if reusable is None or before is None or scene.lighting.shadows:
+        return follower.follow(rays, regions)
+    with follower.stats.stage("cull", scene.device):
+        runs = changed_runs(before, rays, regions, reusable.moved, len(scene.objects))
+    return follower.follow(rays, regions) if runs is None else follow_changed(follower, before, rays, regions, runs)
 
 
 def follow_changed(

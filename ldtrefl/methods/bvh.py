@@ -17,6 +17,7 @@ from ldtrefl.frame.bounces import RayFollower, summed_by_pixel
 from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.history import Reusable
 from ldtrefl.frame.reflected_light import ReflectedLight
+from ldtrefl.frame.refollow import followed_with_history
 from ldtrefl.frame.regions import FEW_OBJECTS, Regions, all_objects, safe_regions
 from ldtrefl.methods.base import RayConfig, RayMethod
 from ldtrefl.tracing.ray_buffers import RayBuffer
@@ -34,11 +35,11 @@ class Bvh(RayMethod):
     def reflect_rays(
         self, gbuffer: GBuffer, rays: RayBuffer, reusable: Reusable | None, stats: Stats
     ) -> ReflectedLight:
-        """Trace every reflected ray."""
+        """Trace the reflected rays; while the camera stays, those that may end elsewhere than in the last frame."""
         follower = RayFollower(gbuffer, self, self.config.limits(self.scene.scene), self.skip, stats)
-        followed = follower.follow(rays, follower.first_regions(rays))
-        hits = FirstHits.of(gbuffer, followed)
-        return ReflectedLight(summed_by_pixel(gbuffer.reflector_pixels, rays, followed.radiance), hits)
+        followed = followed_with_history(follower, rays, follower.first_regions(rays), reusable)
+        radiance = summed_by_pixel(gbuffer.reflector_pixels, rays, followed.radiance)
+        return ReflectedLight(radiance, FirstHits.of(gbuffer, followed), followed)
 
     def regions(self, gbuffer: GBuffer, rays: RayBuffer, bounce: int, stats: Stats) -> Regions:
         """Every ray may meet every object; of many, what it cannot meet is left out."""

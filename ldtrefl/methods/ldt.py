@@ -23,14 +23,14 @@ from pydantic.dataclasses import dataclass
 
 from ldtrefl.device.stats import Stats
 from ldtrefl.frame.bounce_hits import FirstHits
-from ldtrefl.frame.bounces import FollowedRays, RayFollower, summed_by_pixel
+from ldtrefl.frame.bounces import BounceLimits, RayFollower, summed_by_pixel
 from ldtrefl.frame.camera_shading import first_rays
 from ldtrefl.frame.flat_regions import flat_regions
 from ldtrefl.frame.footprint import finest_footprints
 from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.history import Reusable
 from ldtrefl.frame.reflected_light import ReflectedLight
-from ldtrefl.frame.refollow import changed_runs, follow_changed
+from ldtrefl.frame.refollow import followed_with_history
 from ldtrefl.frame.regions import FEW_OBJECTS, Regions, all_objects, objects_that_rays_meet, safe_regions
 from ldtrefl.ldt.options import (
     BINARY_STEPS,
@@ -112,7 +112,8 @@ class Ldt(RayMethod):
         follower = RayFollower(gbuffer, self, self.config.limits(self.scene.scene), self.skip, stats)
         regions = follower.first_regions(rays)
         chosen = dict(self.tracer.chosen)
-        followed = self._followed_again(follower, rays, regions, reusable) or follower.follow(rays, regions)
+        serving = reusable if self._serves_again(reusable, follower.limits) else None
+        followed = followed_with_history(follower, rays, regions, serving)
         self.tracer.drop_old_maps()
         stats.counters["objects_skipped"] = self.tracer.meshes_without_maps(self.scene)
         radiance = summed_by_pixel(gbuffer.reflector_pixels, rays, followed.radiance)
@@ -136,23 +137,16 @@ class Ldt(RayMethod):
         """The maps of these objects, peeled on first need."""
         return self.tracer.bound(self.scene, objects, stats)
 
-    def _followed_again(
-        self, follower: RayFollower, rays: RayBuffer, regions: Regions, reusable: Reusable | None
-    ) -> FollowedRays | None:
-        """Where the rays end, taken from the last frame but for rays that may end elsewhere; None if it cannot be used.
+    def _serves_again(self, reusable: Reusable | None, limits: BounceLimits) -> bool:
+        """Whether the last frame's answer was made with the same maps as this one's.
 
         A ray that has not changed meets no mesh that it could not meet then. So only the maps of meshes that are in
         both frames must be the same.
         """
-        if reusable is None or reusable.reflected.followed is None or (self._chooses and follower.limits.most > 1):
-            return None
+        if reusable is None or (self._chooses and limits.most > 1):
+            return False
         then, chosen = reusable.reflected.resolutions, self.tracer.chosen
-        if self.scene.lighting.shadows or any(then[mesh] != chosen[mesh] for mesh in then.keys() & chosen.keys()):
-            return None
-        before = reusable.reflected.followed
-        with follower.stats.stage("cull", self.scene.device):
-            runs = changed_runs(before, rays, regions, reusable.moved, len(self.scene.objects))
-        return None if runs is None else follow_changed(follower, before, rays, regions, runs)
+        return all(then[mesh] == chosen[mesh] for mesh in then.keys() & chosen.keys())
 
     @property
     def _chooses(self) -> bool:

@@ -40,6 +40,21 @@ def test_only_what_a_move_touches_is_done_again() -> None:
     assert_as_fresh(renderer, renderer.render())
 
 
+@pytest.mark.parametrize("max_bounces", [1, 4])
+def test_a_move_among_many_objects_is_traced_again_only_where_it_matters(max_bounces: int) -> None:
+    among_many = scene()
+    box = among_many.objects[-1]
+    boxes = (dataclasses.replace(box, name=f"box {k}", translate=(0.5 * k - 1.5, -1.8, -0.8)) for k in range(6))
+    among_many = dataclasses.replace(among_many, objects=(*among_many.objects, *boxes))
+    renderer = ldtrefl.Renderer(among_many, "bvh", max_bounces=max_bounces)
+    first = renderer.render()
+    for place in ((-1.5, -1.1, 0.1), (-1.6, -1.2, 0.3)):
+        renderer.move("torus", translate=place)
+        frame = renderer.render()
+        assert_as_fresh(renderer, frame, "bvh", max_bounces=max_bounces)
+        assert 0 < frame.stats.counters["rays"] < 0.5 * first.stats.counters["rays"]
+
+
 def test_moves_of_several_objects_in_turn() -> None:
     renderer = ldtrefl.Renderer(scene(), "ldt")
     renderer.render()
