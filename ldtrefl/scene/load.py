@@ -11,7 +11,7 @@ import functools
 import json
 import os
 import typing
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -76,24 +76,32 @@ def _found(scene: Scene, places: dict[int, np.ndarray], path: Path) -> Scene:
     _at(path, "object", lambda: budget.take(OBJECT_BYTES * count, f"a list of {count}"))
     # What several objects share is made once, and so is taken from the budget once.
     meshes: dict[tuple[str | None, str, str], Mesh] = {}
-    objects: dict[str, Object] = {}
+    objects: list[Object] = []
     for index, entry in enumerate(scene.objects):
         key = f"object[{index}]"
         found = _found_object(entry, key, path, meshes)
         if index in places:
-            placed = _at(path, key, functools.partial(standing_in, found, places[index]))
-            objects |= {f"{key}: places[{number}]": copy for number, copy in enumerate(placed)}
+            objects += _at(path, key, functools.partial(standing_in, found, places[index]))
         else:
-            objects[key] = found
+            objects.append(found)
     environment = _found_environment(scene.environment, path)
-    laid_out = dataclasses.replace(scene, objects=tuple(objects.values()), environment=environment)
+    laid_out = dataclasses.replace(scene, objects=tuple(objects), environment=environment)
     try:
         laid_out.layout  # noqa: B018  (it refuses sizes that are not allowed)
     except InputError:
-        for key, entry in objects.items():
+        for key, entry in zip(_keys(len(scene.objects), places), objects, strict=True):
             _at(path, key, entry.world_from_object)
         raise
     return laid_out
+
+
+def _keys(tables: int, places: dict[int, np.ndarray]) -> Iterator[str]:
+    """Where each object stands in the scene file."""
+    for index in range(tables):
+        if index in places:
+            yield from (f"object[{index}]: places[{number}]" for number in range(len(places[index])))
+        else:
+            yield f"object[{index}]"
 
 
 def _found_object(entry: Object, key: str, path: Path, meshes: dict[tuple[str | None, str, str], Mesh]) -> Object:

@@ -51,10 +51,14 @@ def placements(
     low, high = bounds[:, 0], bounds[:, 1]
     side = _longest_sides(bounds)
     with np.errstate(all="ignore"):  # what is not finite is not allowed
-        factor = np.divide(fit, side, out=np.ones_like(fit), where=side > 0.0)
-        fitted = _scalings(np.repeat(factor[:, None], 3, axis=1)) @ _translations(-(low + (high - low) / 2))
-        matrices = np.where(np.isnan(fit)[:, None, None], _IDENTITY, fitted)
-        return _translations(translate) @ _rotations(rotate) @ _scalings(scale) @ matrices
+        matrices = _identities(len(fit))
+        np.multiply(_rotations(rotate), scale[:, None, :], out=matrices[:, :3, :3])
+        matrices[:, :3, 3] = translate
+        fitted = np.flatnonzero(~np.isnan(fit))
+        factor = np.divide(fit, side, out=np.ones_like(fit), where=side > 0.0)[fitted]
+        centring = _translations(-(low + (high - low) / 2)[fitted])
+        matrices[fitted] @= _scalings(np.repeat(factor[:, None], 3, axis=1)) @ centring
+        return matrices
 
 
 def wrong_sizes(matrices: np.ndarray, bounds: np.ndarray) -> np.ndarray:
@@ -97,7 +101,7 @@ def _scalings(factors: np.ndarray) -> np.ndarray:
 
 
 def _rotations(axes_and_degrees: np.ndarray) -> np.ndarray:
-    """Rodrigues' formula."""
+    """(n, 3, 3), by Rodrigues' formula."""
     axes = axes_and_degrees[:, :3]
     axes = axes / np.sqrt(np.vecdot(axes, axes))[:, None]
     # Whole quarter turns must be exact, so that they only permute axes.
@@ -111,6 +115,4 @@ def _rotations(axes_and_degrees: np.ndarray) -> np.ndarray:
     cross[:, 1, 0], cross[:, 2, 0], cross[:, 2, 1] = z, -y, x
     along = axes[:, :, None] * axes[:, None, :]
     cosine, sine = cosine[:, None, None], sine[:, None, None]
-    matrices = _identities(len(axes))
-    matrices[:, :3, :3] = cosine * _IDENTITY[:3, :3] + sine * cross + (1 - cosine) * along
-    return matrices
+    return cosine * _IDENTITY[:3, :3] + sine * cross + (1 - cosine) * along

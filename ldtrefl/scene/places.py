@@ -90,5 +90,5 @@ def _like(entry: Object, **changes: object) -> Object:
     """A copy of an object, with its mesh, but for ``changes``. It is not checked again: that would take longer than
     reading the file, and an object that gives back too much light would be warned of once a place."""
     copy = object.__new__(Object)
-    vars(copy).update(vars(entry) | changes)
+    object.__setattr__(copy, "__dict__", {**vars(entry), **changes})
     return copy

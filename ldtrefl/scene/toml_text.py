@@ -16,8 +16,8 @@ from typing import Any
 from ldtrefl.base.errors import InputError
 from ldtrefl.files.regular_files import read_regular
 
-MAX_BYTES = 4 << 20
-"""The largest scene file: 16,384 objects with all their keys take three quarters of it."""
+MAX_BYTES = 8 << 20
+"""The largest scene file: 100,000 places with all their digits take three quarters of it."""
 MAX_BRACKETS = 32
 """Brackets and braces open at once."""
 MAX_DOTS = 16
@@ -25,9 +25,11 @@ MAX_DOTS = 16
 MAX_WORD = 100
 """Characters of a number or a bare key: float64 needs 24."""
 
+_NUMBER = r"[+-]?[0-9]{1,30}+(?:\.[0-9]{1,30}+)?(?:e[+-]?[0-9]{1,3}+)?"
 _TOKEN = re.compile(
     r"""
-      \#[^\n]*+                                            # a comment
+      (?P<numbers> \[ NUMBER (?: ,\ ?NUMBER )++ \] )       # a list of numbers, as most of a long text is
+    | \#[^\n]*+                                            # a comment
     | \"\"\" (?: [^"\\] | \\. | "(?!"") )*+ \"\"\" "{0,2}+  # strings of several lines may end in up to five quotes
     | ''' (?: [^'] | '(?!'') )*+ ''' '{0,2}+
     | " (?: [^"\\\n] | \\. )*+ "
@@ -38,7 +40,7 @@ _TOKEN = re.compile(
     | (?P<end> [\n=,] )
     | (?P<word> [0-9A-Za-z_+:-]{LENGTH,} )
     | (?P<unclosed> ["'] )
-    """.replace("LENGTH", str(MAX_WORD + 1)),
+    """.replace("NUMBER", _NUMBER).replace("LENGTH", str(MAX_WORD + 1)),
     re.VERBOSE | re.DOTALL,
 )
 
@@ -61,9 +63,9 @@ def _check_limits(text: str) -> None:
     depth = dots = 0
     for token in _TOKEN.finditer(text):
         kind = token.lastgroup
-        if kind == "open":
-            depth, dots = depth + 1, 0
-            if depth > MAX_BRACKETS:
+        if kind in ("open", "numbers"):
+            depth, dots = depth + (kind == "open"), 0
+            if depth + (kind == "numbers") > MAX_BRACKETS:
                 raise _beyond(text, token, f"more than {MAX_BRACKETS} brackets within one another")
         elif kind == "close":
             depth, dots = depth - 1, 0

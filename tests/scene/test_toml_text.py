@@ -11,6 +11,8 @@ from ldtrefl.scene.toml_text import MAX_BRACKETS, MAX_BYTES, MAX_DOTS, MAX_WORD,
 
 BEYOND = [
     (f"a = {'[' * (MAX_BRACKETS + 1)}", "brackets"),
+    (f"a = {'[' * MAX_BRACKETS}[1, 2.5]{']' * MAX_BRACKETS}", "brackets"),
+    ("a = [[1, 2e3], [" + "1.1" * 4301, "more than 16 dots"),
     ("a = " + "[" * 3000, "line 1: more than 32 brackets"),
     ("\n\na = " + "{ a = " * 3000, "line 3: more than 32 brackets"),
     ("a." * 50_000 + "a = 1", "more than 16 dots"),
@@ -44,6 +46,8 @@ def test_text_within_the_limits_is_what_pythons_reader_says() -> None:
     d = '''{brackets}''{dots}
         {brackets}'''''
     e = {"[" * MAX_BRACKETS}{"]" * MAX_BRACKETS}
+    i = {"[" * (MAX_BRACKETS - 1)}[1, -2.5, +3.25e-07]{"]" * (MAX_BRACKETS - 1)}
+    j = [1, 2, [3, 4], "[5, 6"]
     f = {{ {"a." * MAX_DOTS}a = {"1" * MAX_WORD} }}
     g = [1.5, -2.5e-3, 1979-05-27T07:32:00.999999-07:00, "]", ']', "", '']
     {"h" * MAX_WORD} = 0x1

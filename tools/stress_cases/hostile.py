@@ -106,7 +106,7 @@ def scenes() -> list[Trial]:
         with_line("a string without end", 'fov_y = """' + "[" * 100_000),
         with_line("fov_y 1e-300", "fov_y = 1e-300"),
         Trial("4 MiB of objects", render, 0, SCENE + one_object * 17_000),
-        Trial("5 MiB of comments", render, 2, SCENE + "#\n" * (5 << 19)),
+        Trial("10 MiB of comments", render, 2, SCENE + "#\n" * (5 << 20)),
         Trial("10,000 lights", render, 2, SCENE + '[[light]]\nkind = "point"\n' * 10_000),
         Trial("scale 1e-300", render, 2, SCENE + "scale = 1e-300\n"),
         Trial("fit times scale", render, 2, SCENE + "fit = 1e-10\nscale = 1e-10\n"),
