@@ -73,7 +73,8 @@ def ball(material: Material, x: float = 0.0) -> Things:
 
 def lamp() -> Things:
     """Something to be seen in mirrors."""
-    return [{"shape": "box", "scale": 0.3, "translate": (-1.8, 0.2, 0.8), "material": ORANGE, "smooth": False}]
+    thing = {"name": "lamp", "shape": "box", "scale": 0.3, "translate": (-1.8, 0.2, 0.8), "smooth": False}
+    return [thing | {"material": ORANGE}]
 
 
 def bowl_with_ball() -> Things:
