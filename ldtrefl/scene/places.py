@@ -92,9 +92,9 @@ def standing_in(entry: Object, places: np.ndarray) -> list[Object]:
 
 
 def _unchecked(values: dict[str, object], geometry: Mesh) -> Object:
-    """An object with a mesh. Its values are not checked again: that would take longer than reading the file, and an
-    object that gives back too much light would be warned of once a place."""
+    """An object of these values, which it takes over, and a mesh. They are not checked again: that would take longer
+    than reading the file, and an object that gives back too much light would be warned of once a place."""
     made = object.__new__(Object)
-    vars(made).update(values)
+    object.__setattr__(made, "__dict__", values)
     made.share_geometry(geometry)
     return made
