@@ -28,14 +28,14 @@ from ldtrefl.scene.description import Camera
 from ldtrefl.world.camera import Band, camera_view, whole_image
 from ldtrefl.world.device_scene import DeviceScene
 from ldtrefl.world.records import ObjectRecord
-from ldtrefl.world.triangle_numbers import TriangleNumbers, first_triangle_of, object_of
+from ldtrefl.world.triangle_numbers import TriangleNumbers, first_triangle_of, has_number, object_of
 
 BAND_PIXELS = 1 << 20
 """Pixels of a band, about: enough rays for all threads, and their arrays take less than 0.2 GB."""
 
 
-PIXELS_IN_A_ROW = 16
-"""Pixels that one thread of a CPU finds: neighbours often see the same triangle, which is then projected once."""
+PIXELS_IN_A_ROW = 64
+"""Pixels that one thread of a CPU finds: neighbours often see the same object."""
 
 
 @wp.func
@@ -105,41 +105,28 @@ def resolve_pixels(
     # Out, the reflectors 0 before:
     seen: GBufferView,
 ):
-    """Find which point of which triangle each pixel of a run sees, from its key."""
-    begin = run * (first + wp.tid())
-    end = wp.min(begin + run, keys.shape[0])
-    i = int(begin)
+    """Find which triangle each pixel of a run sees, from its key."""
+    i = run * (first + wp.tid())
+    end = wp.min(i + run, keys.shape[0])
+    index = int(-1)
+    is_mirror = wp.uint8(0)
     while i < end:
-        if keys[i] == wp.int64(0):
+        key = keys[i]
+        if key == wp.int64(0):
             seen.object[i] = -1
-            seen.triangle[i] = -1
-            seen.barycentrics[i] = wp.vec2(0.0, 0.0)
-            i += 1
         else:
-            number = number_in(keys[i])
-            index = object_of(numbers, number)
-            one = drawn[place_of[index]]
+            number = number_in(key)
+            if not has_number(numbers, index, number):
+                index = object_of(numbers, number)
+                is_mirror = wp.where(wp.max(objects[index].mirror) > 0.0, wp.uint8(1), wp.uint8(0))
             triangle = first_triangle_of(numbers, index, number)
             if numbers.shift > 0:
-                pixel = pixel_of(i, width, first_row)
-                triangle = of_its_group(one, objects, corners, triangle, 1 << numbers.shift, pixel, keys[i])
-            tri = triangle_seen(one, objects, corners, triangle)
-            is_mirror = wp.where(wp.max(objects[index].mirror) > 0.0, wp.uint8(1), wp.uint8(0))
-
-            # Pixels in a row often see the same triangle.
-            more = bool(True)
-            while more:
-                pixel = pixel_of(i, width, first_row)
-                at = perspective_weights(tri, pixel[0], pixel[1])
-                total = at[0] + at[1] + at[2]
-                seen.object[i] = index
-                seen.triangle[i] = triangle
-                seen.barycentrics[i] = wp.vec2(float(at[1] / total), float(at[2] / total))
-                seen.reflector[i] = is_mirror
-                i += 1
-                more = i < end and numbers.shift == 0
-                if more:
-                    more = number_in(keys[i]) == number and keys[i] != wp.int64(0)
+                one, pixel = drawn[place_of[index]], pixel_of(i, width, first_row)
+                triangle = of_its_group(one, objects, corners, triangle, 1 << numbers.shift, pixel, key)
+            seen.object[i] = index
+            seen.triangle[i] = triangle
+            seen.reflector[i] = is_mirror
+        i += 1
 
 
 def resolved(drawing: Drawing, scene: DeviceScene) -> GBuffer:
@@ -147,7 +134,6 @@ def resolved(drawing: Drawing, scene: DeviceScene) -> GBuffer:
     device, camera, pixels = scene.device, drawing.camera, drawing.keys.shape[0]
     view = GBufferView()
     view.object, view.triangle = (wp.empty(pixels, dtype=wp.int32, device=device) for _ in range(2))
-    view.barycentrics = wp.empty(pixels, dtype=wp.vec2, device=device)
     view.reflector = wp.zeros(pixels, dtype=wp.uint8, device=device)
     view.camera = camera_view(camera, scene.device_from_world, drawing.band)
     objects = DrawnObjects.joined([part.objects for part in drawing.drawn])
