@@ -31,8 +31,8 @@ from ldtrefl.world.device_scene import DeviceScene
 from ldtrefl.world.top_level import STACK, TopLevel
 
 FEW_OBJECTS = 8
-"""Up to this many objects culling costs as much as it saves: 4% more time than without it
-with two to five objects, 11% less with fifty."""
+"""Up to this many objects culling costs as much as it saves: 4% more time than without it with two to five objects, 11%
+less with fifty."""
 
 COSINE_SLACK = wp.constant(1.0e-5)
 """Cosines are lowered by this, which widens cones: a hundred roundings of a float32 dot product."""
