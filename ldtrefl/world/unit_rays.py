@@ -45,7 +45,7 @@ def into_unit(record: ObjectRecord, origin: wp.vec3d, direction: wp.vec3) -> Uni
 
 
 @wp.func
-def distance_passed(origin: wp.vec3d, direction: wp.vec3, radius: wp.float64) -> float:
+def distance_passed(origin: wp.vec3d, direction: wp.vec3, radius: wp.float64) -> wp.float64:
     """The t that a ray may skip, because it is still outside a sphere about the unit cube; 0 if it starts inside.
 
     Found in float64: the ray's new origin, near the object, is then rounded to float32 without loss.
@@ -53,7 +53,7 @@ def distance_passed(origin: wp.vec3d, direction: wp.vec3, radius: wp.float64) ->
     exact = as_double(direction)
     square = wp.dot(exact, exact)
     along = -wp.dot(origin, exact) - radius * wp.sqrt(square)
-    return float(wp.max(along, wp.float64(0.0)) / square)
+    return wp.max(along, wp.float64(0.0)) / square
 
 
 @wp.func
