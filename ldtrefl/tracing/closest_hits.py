@@ -109,9 +109,9 @@ def searched_of(tracer: Tracer) -> Callable[..., SearchedRay]:
         searched.query.t_max = t_max * ray.stretch
         if rays.source[i] == k:
             triangle = rays.source_triangle[i]
-            searched.query.origin = start_above_own(objects[k], triangle, ray.origin, ray.direction)
-            outwards = as_single(facet_towards(objects[k], triangle, ray.direction))
-            searched.query = leaving(views, k, searched.query, outwards)
+            outwards = facet_towards(objects[k], triangle, ray.direction)
+            searched.query.origin = start_above_own(objects[k], triangle, ray.origin, outwards)
+            searched.query = leaving(views, k, searched.query, as_single(outwards))
         return searched
 
     return searched_ray

@@ -92,13 +92,12 @@ def facet_towards(record: ObjectRecord, triangle: int, outwards: wp.vec3) -> wp.
 
 
 @wp.func
-def start_above_own(record: ObjectRecord, triangle: int, start: wp.vec3d, outwards: wp.vec3) -> wp.vec3d:
+def start_above_own(record: ObjectRecord, triangle: int, start: wp.vec3d, normal: wp.vec3d) -> wp.vec3d:
     """Where a ray starts that is searched for in the object that it leaves, in unit space.
 
-    It starts above the plane of the triangle that it leaves, to the side of ``outwards``, by the rounding of
-    coordinates there. ``start`` may lie a little off that plane: its hit was rounded, or was on a patch.
+    It starts above the plane of the triangle that it leaves, to the side of ``normal`` (:func:`facet_towards`), by the
+    rounding of coordinates there. ``start`` may lie a little off that plane: its hit was rounded, or was on a patch.
     """
-    normal = facet_towards(record, triangle, outwards)
     if normal == wp.vec3d(wp.float64(0.0)):
         return start
     a = unit_vertex(record, record.faces[triangle][0])
