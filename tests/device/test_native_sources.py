@@ -48,7 +48,8 @@ SOURCES = {
     "device/cpu_threads.h": (cpu_threads.CONSTANTS, ()),
     "device/vectors.h": ({}, ()),
     "frame/run_rays.h": (run_rays.CONSTANTS, ("device/vectors.h",)),
-    "tracing/ray_batch.h": ({}, ("device/vectors.h",)),
+    "tracing/ray_query.h": ({}, ("device/vectors.h",)),
+    "tracing/ray_batch.h": ({}, ("device/vectors.h", "tracing/ray_query.h")),
     "tracing/triangle_test.h": ({}, ("device/vectors.h",)),
     "tracing/bvh_walk.h": (bvh_walk.CONSTANTS, bvh_walk.FILES[:-1]),
     **{
