@@ -10,10 +10,11 @@ from collections.abc import Callable
 import warp as wp
 
 from ldtrefl.device import launch
+from ldtrefl.device.bits import lowest_bit
 from ldtrefl.geometry.sphere import meets_sphere, sphere_entry
 from ldtrefl.geometry.vectors import as_single
 from ldtrefl.tracing.hit import Hit
-from ldtrefl.tracing.object_sets import RUN, ObjectSets, is_listed, lowest_bit, object_listed, objects_listed
+from ldtrefl.tracing.object_sets import RUN, ObjectSets, is_listed, object_listed, objects_listed
 from ldtrefl.tracing.ray_buffers import HitBuffer, RayBuffer, keep_nearer, set_miss
 from ldtrefl.tracing.tracer import Query, Tracer
 from ldtrefl.world.records import ObjectRecord
@@ -40,14 +41,14 @@ def first_entered(
 ) -> int:
     """Of the entries from ``begin`` on of a run's list that are left, a bit each, the one whose object a ray enters
     first, by bounding spheres; any of them if it enters none."""
-    first = begin + lowest_bit(left)
+    first = begin + lowest_bit(wp.uint64(left))
     rest = left & (left - wp.uint32(1))
     nearest = float(-1.0)
     if rest != wp.uint32(0):
         k = object_listed(sets, run, first)
         nearest = sphere_entry(origin, direction, objects[k].centre, objects[k].radius)
     while rest != wp.uint32(0):
-        entry = begin + lowest_bit(rest)
+        entry = begin + lowest_bit(wp.uint64(rest))
         k = object_listed(sets, run, entry)
         entered = sphere_entry(origin, direction, objects[k].centre, objects[k].radius)
         if entered >= 0.0 and (entered < nearest or nearest < 0.0):
