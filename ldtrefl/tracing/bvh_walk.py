@@ -3,7 +3,7 @@ closed mesh none passes.
 
 A triangle is tested in float64 (``triangle_test.h``), so that triangles share their edges exactly. The boxes of the
 tree are wider than their triangles by what is rounded where a ray is tested against them, so that no box is missed
-whose triangle is met. For vertices that have moved, boxes are made anew (:func:`box_triangles`) and the tree refitted.
+whose triangle is met.
 
 The walk (``bvh_walk.h``) reads the nodes of Warp's tree: Warp's own query does not visit the nearest child first, and
 takes two to three times as long. It stands in for the walk where this version of Warp is not known, and gives the same
