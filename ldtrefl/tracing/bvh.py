@@ -6,6 +6,7 @@ triangles that share an edge or a vertex, stands in ``bvh_walk.py``.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 
 import numpy as np
@@ -165,11 +166,13 @@ class Raycaster:
         Raises:
             InputError: the arrays' shapes do not fit, or they hold no numbers.
         """
-        return trace_batch(BVH, self._views(), self.geometry, origins, directions, t_max)
+        return trace_batch(BVH, self._views, self.geometry, origins, directions, t_max)
 
     def occluded(self, origins: RayArray, directions: RayArray, t_max: RayArray | None = None) -> np.ndarray | wp.array:
         """(...) bool: whether rays meet the mesh at all. Arguments and errors are those of :meth:`trace`."""
-        return occluded_batch(BVH, self._views(), self.geometry, origins, directions, t_max)
+        return occluded_batch(BVH, self._views, self.geometry, origins, directions, t_max)
 
+    @functools.cached_property
     def _views(self) -> wp.array:
+        """:meth:`view` as kernels read it."""
         return array_of_views([self.view()], BvhView, self.geometry.vertices.device)
