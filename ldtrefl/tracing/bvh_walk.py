@@ -96,11 +96,9 @@ def walk_to_any(
 ASK = """
     auto& view = views.data[index];
     const TriangleTest::Line line = TriangleTest::line_of(&start[0], &direction[0]);
-    const int* corners = &view.faces.data[triangle][0];
+    const float* vertices = &view.vertices.data[0][0];
     TriangleTest::Meeting met;
-    const float *a = &view.vertices.data[corners[0]][0], *b = &view.vertices.data[corners[1]][0];
-    const bool is_met = TriangleTest::meet(line, a, b, &view.vertices.data[corners[2]][0], met);
-    if (!is_met) met = {-1.0, 0.0, 0.0};
+    if (!TriangleTest::meet_numbered(line, vertices, &view.faces.data[0][0], triangle, met)) met = {-1.0, 0.0, 0.0};
     return wp::vec_t<4, wp::float64>(met.t, met.u, met.v, (double)triangle);
 """
 
