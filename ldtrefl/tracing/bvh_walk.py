@@ -16,6 +16,7 @@ import warp as wp
 
 from ldtrefl.device import launch, warp_abi
 from ldtrefl.device.native_sources import native_body
+from ldtrefl.geometry.triangle import facet_normal
 from ldtrefl.geometry.vectors import as_double, as_single
 from ldtrefl.world.outliers import Outliers
 
@@ -152,8 +153,7 @@ def query_any(
 
 @wp.func
 def unit_facet_normal(view: BvhView, triangle: int) -> wp.vec3:
-    """A triangle's unit normal by its winding, in float64: of a slim triangle's cross product float32 leaves little."""
+    """A triangle's unit normal by its winding."""
     corners = view.faces[triangle]
-    a = as_double(view.vertices[corners[0]])
-    edge_u, edge_v = as_double(view.vertices[corners[1]]) - a, as_double(view.vertices[corners[2]]) - a
-    return as_single(wp.normalize(wp.cross(edge_u, edge_v)))
+    a, b, c = view.vertices[corners[0]], view.vertices[corners[1]], view.vertices[corners[2]]
+    return as_single(facet_normal(as_double(a), as_double(b), as_double(c)))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import warp as wp
 
+from ldtrefl.geometry.triangle import facet_normal
 from ldtrefl.geometry.vectors import as_double, as_single
 from ldtrefl.world.records import ObjectRecord
 
@@ -84,8 +85,8 @@ def start_above(start: wp.vec3d, outwards: wp.vec3) -> wp.vec3d:
 def facet_towards(record: ObjectRecord, triangle: int, outwards: wp.vec3) -> wp.vec3d:
     """A triangle's unit normal in unit space, to the side of ``outwards``; 0 if the triangle has no area."""
     corners = record.faces[triangle]
-    a = unit_vertex(record, corners[0])
-    normal = wp.normalize(wp.cross(unit_vertex(record, corners[1]) - a, unit_vertex(record, corners[2]) - a))
+    a, b, c = unit_vertex(record, corners[0]), unit_vertex(record, corners[1]), unit_vertex(record, corners[2])
+    normal = facet_normal(a, b, c)
     if wp.dot(normal, as_double(outwards)) < wp.float64(0.0):
         return -normal
     return normal
