@@ -145,6 +145,13 @@ struct Vectors {
         return __builtin_ctz(word);
 #endif
     }
+    SHARED int lowest_bit(unsigned long long word) {
+#if defined(__CUDA_ARCH__)
+        return __ffsll((long long)word) - 1;
+#else
+        return __builtin_ctzll(word);
+#endif
+    }
     // Whether at most two bits are set.
     SHARED bool has_few(int word) {
         word &= word - 1;

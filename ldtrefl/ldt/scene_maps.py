@@ -58,6 +58,8 @@ class _Bound:
 
     maps: dict[DeviceMesh, LayeredDepthTexture | None]
     """The maps of each mesh; None where none are needed."""
+    mesh_of: np.ndarray
+    """The scene's: which object has which mesh."""
     tracer: BoundTracer
 
 
@@ -93,9 +95,10 @@ class SceneMaps:
             for key in [key for key in maps if key.mesh not in meshes]:
                 del maps[key]  # of a mesh that has been deformed since
             current = {mesh: maps.get(self._key(mesh, mesh in mirrors)) for mesh in scene.meshes}
-            if self._bound is None or self._bound.maps != current:
-                self._bound = self._bind(scene, current)
-        return self._bound.tracer
+            bound = self._bound
+            if bound is None or bound.mesh_of is not scene.mesh_of or bound.maps != current:
+                bound = self._bound = self._bind(scene, current)
+        return bound.tracer
 
     def has_usual_maps(self, scene: DeviceScene, objects: Collection[int]) -> bool:
         """Whether the maps of these objects are made, at the usual resolution."""
@@ -146,7 +149,7 @@ class SceneMaps:
             for maps in current.values()
         ]
         views = array_of_shared_views(of_meshes, scene.mesh_of, tracer.view, scene.device)
-        return _Bound(current, BoundTracer(tracer, views, of_meshes))
+        return _Bound(current, scene.mesh_of, BoundTracer(tracer, views, of_meshes))
 
 
 def _warn_if_open(scene: DeviceScene, mesh: DeviceMesh) -> None:

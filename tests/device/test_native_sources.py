@@ -51,7 +51,8 @@ SOURCES = {
     "frame/backdrop.h": ({}, ("device/vectors.h",)),
     "shading/surfaces.h": (surfaces.CONSTANTS, ("device/vectors.h",)),
     "frame/run_rays.h": (run_rays.CONSTANTS, ("device/vectors.h",)),
-    "tracing/ray_batch.h": ({}, ("device/vectors.h",)),
+    "tracing/ray_query.h": ({}, ("device/vectors.h",)),
+    "tracing/ray_batch.h": ({}, ("device/vectors.h", "tracing/ray_query.h")),
     "tracing/triangle_test.h": ({}, ("device/vectors.h",)),
     "tracing/bvh_walk.h": (bvh_walk.CONSTANTS, bvh_walk.FILES[:-1]),
     **{

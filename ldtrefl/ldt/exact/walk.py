@@ -94,6 +94,7 @@ CONSTANTS: dict[str, float | int] = {
 
 FILES = (
     "device/vectors.h",
+    "tracing/ray_query.h",
     "ldt/exact/rays.h",
     "ldt/exact/boxes.h",
     "ldt/exact/triangles.h",
