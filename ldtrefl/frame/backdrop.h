@@ -2,20 +2,21 @@
 // (backdrop.py).
 
 struct Backdrop : Vectors {
-    // Along a row of pixels directions are ``start + x * step``.
+    // A row of pixels: ``middle`` is the direction of its middle, ``middle + right`` that of its right end.
     struct Row {
-        float start[3], step[3], up[3], ground[3], rise[3];  // rise: from the ground's colour to the sky's
+        float width, middle[3], right[3], up[3], ground[3], rise[3];  // rise: from the ground's colour to the sky's
     };
 
     // Write the radiance of ``count`` pixels from ``x`` on, three floats each.
     SHARED void fill(const Row& row, int x, int count, float* radiance) {
         FUSED
         Wide at;
-        for (int i = 0; i < WIDE; ++i) at[i] = (float)(x + i);
-        for (int done = 0; done < count; done += WIDE, at = at + wide((float)WIDE)) {
+        for (int i = 0; i < WIDE; ++i) at[i] = (float)(2 * (x + i) + 1) - row.width;
+        for (int done = 0; done < count; done += WIDE, at = at + wide(2.0f * (float)WIDE)) {
+            const Wide across = at / wide(row.width);
             Wide height = wide(0.0f), square = wide(0.0f);
             for (int k = 0; k < 3; ++k) {
-                const Wide way = wide(row.start[k]) + at * wide(row.step[k]);
+                const Wide way = wide(row.middle[k]) + across * wide(row.right[k]);
                 height = height + way * wide(row.up[k]);
                 square = square + way * way;
             }

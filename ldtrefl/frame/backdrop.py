@@ -17,7 +17,7 @@ FILES = ("device/vectors.h", "frame/backdrop.h")
 
 FILL = """
 const Backdrop::Row row = {
-    {start[0], start[1], start[2]}, {step[0], step[1], step[2]}, {up[0], up[1], up[2]},
+    (float)width, {middle[0], middle[1], middle[2]}, {right[0], right[1], right[2]}, {up[0], up[1], up[2]},
     {ground[0], ground[1], ground[2]}, {rise[0], rise[1], rise[2]}
 };
 Backdrop::fill(row, x, count, &radiance_out.data[pixel][0]);
@@ -26,8 +26,9 @@ Backdrop::fill(row, x, count, &radiance_out.data[pixel][0]);
 
 @wp.func_native(native_body({}, FILES, FILL))
 def fill_gradient(
-    start: wp.vec3,
-    step: wp.vec3,
+    middle: wp.vec3,
+    right: wp.vec3,
+    width: int,
     up: wp.vec3,
     ground: wp.vec3,
     rise: wp.vec3,
@@ -36,8 +37,9 @@ def fill_gradient(
     pixel: int,
     radiance_out: wp.array(dtype=wp.vec3),
 ):
-    """Fill in ``count`` pixels of a row from ``pixel`` on, which is column ``x``. Column i looks along
-    ``start + i * step``; the radiance is the ground's downwards, and ``rise`` more upwards."""
+    """Fill in ``count`` pixels of a row of ``width`` from ``pixel`` on, which is column ``x``. The row's middle looks
+    along ``middle``, its right end along ``middle + right``; the radiance is the ground's downwards, and ``rise`` more
+    upwards."""
     ...
 
 
@@ -51,9 +53,11 @@ def fill_backdrop(
         row = i / camera.width
         rest = wp.min(end, (row + 1) * camera.width)
         if lighting.image_size[0] == 0:
-            start, next_one = camera_ray(camera, 0.5, float(row) + 0.5), camera_ray(camera, 1.5, float(row) + 0.5)
+            middle = camera_ray(camera, 0.5 * float(camera.width), float(row) + 0.5)
             rise, x = lighting.sky - lighting.ground, i - row * camera.width
-            fill_gradient(start, next_one - start, lighting.up, lighting.ground, rise, x, rest - i, i, radiance_out)
+            fill_gradient(
+                middle, camera.right, camera.width, lighting.up, lighting.ground, rise, x, rest - i, i, radiance_out
+            )
             i = rest
         else:
             while i < rest:

@@ -18,6 +18,7 @@ import warp as wp
 
 from ldtrefl.base import budget
 from ldtrefl.device import launch
+from ldtrefl.device.bits import lowest_bit
 from ldtrefl.device.stats import Stats
 from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.regions import Regions
@@ -31,7 +32,7 @@ from ldtrefl.shading.surface import Surface, extended_coordinates, may_return
 from ldtrefl.shading.surfaces import GROUP, Sighting, color_surface, look_along
 from ldtrefl.tracing.closest_hits import closest_hits_kernel
 from ldtrefl.tracing.nothing import no_shadows
-from ldtrefl.tracing.object_sets import ObjectSets, lowest_bit
+from ldtrefl.tracing.object_sets import ObjectSets
 from ldtrefl.tracing.ray_buffers import HitBuffer, RayBuffer, RayEnds, empty_hits, empty_rays
 from ldtrefl.tracing.tracer import BoundTracer, Tracer, block_of
 from ldtrefl.world.records import LightingRecord, ObjectRecord
@@ -157,7 +158,7 @@ def shade_hits_kernel(tracer: Tracer) -> wp.Kernel:
                     add_brought(radiance, numbers, i, wp.cw_mul(rays.throughput[i], brought))
             look_along(objects, lanes, sightings, surfaces)
             while lanes != 0:
-                lane = lowest_bit(wp.uint32(lanes))
+                lane = lowest_bit(wp.uint64(lanes))
                 lanes = lanes & (lanes - 1)
                 i = begin + lane
                 color_surface(objects, sightings, lane, surfaces)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import warp as wp
 
 from ldtrefl.device import launch
+from ldtrefl.device.bits import lowest_bit
 from ldtrefl.frame.backdrop import fill_backdrop
 from ldtrefl.frame.gbuffer import GBuffer, GBufferView, sight
 from ldtrefl.frame.shadows import direct_radiance_of
@@ -12,7 +13,6 @@ from ldtrefl.shading.specular import mirror_direction
 from ldtrefl.shading.surface import Surface, may_return
 from ldtrefl.shading.surfaces import GROUP, Sighting, color_surface, look_from
 from ldtrefl.tracing.nothing import no_shadows
-from ldtrefl.tracing.object_sets import lowest_bit
 from ldtrefl.tracing.ray_buffers import RayBuffer, empty_rays
 from ldtrefl.tracing.tracer import BoundTracer, Tracer, block_of
 from ldtrefl.world.records import LightingRecord, ObjectRecord
@@ -60,7 +60,7 @@ def shade_pixels_kernel(tracer: Tracer) -> wp.Kernel:
                 i += 1
             look_from(objects, lanes, gbuffer.camera.eye, sightings, surfaces)
             while lanes != 0:
-                lane = lowest_bit(wp.uint32(lanes))
+                lane = lowest_bit(wp.uint64(lanes))
                 lanes = lanes & (lanes - 1)
                 color_surface(objects, sightings, lane, surfaces)
                 radiance_out[begin + lane] = direct_radiance(views, objects, top, lighting, surfaces[lane])

@@ -9,11 +9,11 @@ import numpy as np
 import warp as wp
 
 from ldtrefl.device import launch
+from ldtrefl.device.bits import lowest_bit
 from ldtrefl.frame.pixel_order import pixels_in_blocks
 from ldtrefl.scene.description import Camera
 from ldtrefl.shading.surface import Surface
 from ldtrefl.shading.surfaces import GROUP, Sighting, group_on, look_from
-from ldtrefl.tracing.object_sets import lowest_bit
 from ldtrefl.world.camera import Band, CameraView, camera_ray
 from ldtrefl.world.device_scene import DeviceScene
 from ldtrefl.world.records import ObjectRecord
@@ -67,7 +67,7 @@ def find_surfaces(
             lanes = lanes | (1 << (i - begin))
     look_from(objects, lanes, gbuffer.camera.eye, sightings, surfaces)
     while lanes != 0:
-        lane = lowest_bit(wp.uint32(lanes))
+        lane = lowest_bit(wp.uint64(lanes))
         lanes = lanes & (lanes - 1)
         position_out[begin + lane] = surfaces[lane].position
         normal_out[begin + lane] = surfaces[lane].normal

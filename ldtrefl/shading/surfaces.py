@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import warp as wp
 
+from ldtrefl.device.bits import lowest_bit
 from ldtrefl.device.native_sources import native_body
 from ldtrefl.shading.specular import schlick
 from ldtrefl.shading.surface import Surface, albedo_at
-from ldtrefl.tracing.object_sets import lowest_bit
 from ldtrefl.world.records import ObjectRecord
 
 GROUP = wp.constant(8)
@@ -125,7 +125,7 @@ def lanes_of(sightings: wp.array(dtype=Sighting), left: int, k: int) -> int:
     lanes = int(0)
     while left != 0:
         bit = left & -left
-        if sightings[lowest_bit(wp.uint32(left))].object == k:
+        if sightings[lowest_bit(wp.uint64(left))].object == k:
             lanes = lanes | bit
         left = left & ~bit
     return lanes
@@ -143,7 +143,7 @@ def look_from(
     views meet their triangles. Then their barycentrics are set, and their views have unit length."""
     left = lanes
     while left != 0:
-        k = sightings[lowest_bit(wp.uint32(left))].object
+        k = sightings[lowest_bit(wp.uint64(left))].object
         same = lanes_of(sightings, left, k)
         surfaces_of_object_from(objects, k, same, eye, sightings, surfaces)
         left = left & ~same
@@ -159,7 +159,7 @@ def look_along(
     """Find the surfaces, but for their colours, at these lanes' barycentrics, a bit each, along their views."""
     left = lanes
     while left != 0:
-        k = sightings[lowest_bit(wp.uint32(left))].object
+        k = sightings[lowest_bit(wp.uint64(left))].object
         same = lanes_of(sightings, left, k)
         surfaces_of_object_along(objects, k, same, sightings, surfaces)
         left = left & ~same
