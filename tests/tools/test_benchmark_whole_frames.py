@@ -142,6 +142,8 @@ def test_starts_of_two_checkouts_are_compared() -> None:
     times = {"now": {"median": 3.0, "min": 1.0, "max": 9.0}, "before": {"median": 4.0, "min": 1.0, "max": 9.0}}
     found = cells(start_table({"start": [{"what": "warm", "checkouts": times}]}), "warm")
     assert found["now / before"] == "0.75"
+    alone = start_table({"start": [{"what": "warm", "checkouts": {"now": times["now"]}}]})
+    assert cells(alone, "warm") == {"": "warm", "now": "3.0 (1.0 to 9.0)"}
 
 
 def test_the_tool_compares_checkouts_scene_by_scene(tmp_path: Path) -> None:

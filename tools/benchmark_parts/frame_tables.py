@@ -83,13 +83,14 @@ def start_table(result: Result) -> list[str]:
     """From process to picture."""
     rows: list[StartRow] = result["start"]
     labels = list(rows[0]["checkouts"])
+    first, *others = labels
     body = []
     for row in rows:
         found = row["checkouts"]
         cells = [row["what"], *(_summary(found[label]) for label in labels)]
-        body.append([*cells, number(found[labels[0]]["median"] / found[labels[-1]]["median"])])
+        body.append([*cells, *(number(found[first]["median"] / found[other]["median"]) for other in others)])
     lines = ["## `ldtrefl render` of the teapot, from process to picture, milliseconds", ""]
-    return lines + table(["", *labels, f"{labels[0]} / {labels[-1]}"], body)
+    return lines + table(["", *labels, *(f"{first} / {other}" for other in others)], body)
 
 
 def _sizes(rows: list[FrameRow]) -> list[str]:
