@@ -15,7 +15,6 @@ from mitsuba_comparison import table
 from mitsuba_parts.emission_only import emission_only
 from mitsuba_parts.judge import Judgement, judgement
 from mitsuba_parts.mirror_paths import SMALL_LIFT, MirrorPaths, MitsubaPictures
-from mitsuba_parts.mitsuba_scene import mitsuba
 from picture_edges import near_edge
 
 import ldtrefl
@@ -30,15 +29,6 @@ BRICKS = str(ROOT / "scenes" / "textures" / "bricks.png")
 
 CLOSE = 1e-3
 """Radiance by which pixels that see no edge may differ: float32 moves a picture of bricks by a hundredth of a texel."""
-
-
-@pytest.fixture
-def with_mitsuba() -> None:
-    """Skips the test where Mitsuba cannot be used."""
-    try:
-        mitsuba()
-    except ldtrefl.InputError as error:
-        pytest.skip(str(error))
 
 
 def of_everything() -> Scene:
