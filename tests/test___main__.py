@@ -57,3 +57,23 @@ def test_signals_that_the_caller_ignores_stay_ignored(scene_folder: Path) -> Non
     )
     done = subprocess.run([sys.executable, "-c", code, "methods"], capture_output=True, text=True, check=False)
     assert done.returncode == 0 and "still here" in done.stdout
+
+
+def test_a_process_does_what_was_registered_for_its_end(scene_folder: Path) -> None:
+    """Its memory is not freed piece by piece, but standard output is written and ``atexit`` heeded."""
+    code = (
+        "import atexit, sys; atexit.register(print, 'at the end', flush=True);"
+        "import ldtrefl.__main__ as program; program.run()"
+    )
+    for arguments, status in ((["info", "scene.toml"], 0), (["info", "nothing.toml"], 2)):
+        command = [sys.executable, "-c", code, *arguments]
+        done = subprocess.run(command, cwd=scene_folder, capture_output=True, text=True, check=False)
+        assert done.returncode == status, done.stderr
+        assert done.stdout.endswith("at the end\n") and ("camera" in done.stdout) == (status == 0)
+
+
+def test_the_program_imports_no_library_that_a_command_may_not_need() -> None:
+    """They take half of its start."""
+    code = "import sys, ldtrefl.cli.program; print(*{'networkx', 'scipy', 'skimage', 'trimesh'} & {*sys.modules})"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []

@@ -14,7 +14,7 @@ from ldtrefl.device.launch import set_threads
 from ldtrefl.files.regular_files import check_regular
 from ldtrefl.scene import shapes
 from ldtrefl.scene.mesh import Mesh
-from ldtrefl.scene.readers.mesh_files import load_mesh
+from ldtrefl.scene.readers import load_mesh
 from ldtrefl.scene.toml_text import parse_toml
 
 SceneFile = Annotated[Path, typer.Argument(metavar="SCENE", help="A scene file (TOML).")]

@@ -9,6 +9,7 @@ every slicing, so the bits do not depend on the number of threads.
 from __future__ import annotations
 
 import functools
+import hashlib
 import operator
 import os
 import threading
@@ -46,6 +47,7 @@ class _State:
 
     threads: int = os.cpu_count() or 1
     teams: dict[int, ThreadTeam | PythonThreads] = field(default_factory=dict)  # by number of threads
+    names: dict[str, int] = field(default_factory=dict)  # of kernels' modules, and how many asked for each
     lock: threading.Lock = field(default_factory=threading.Lock)  # to make a team
     defining: threading.RLock = field(default_factory=threading.RLock)  # to define kernels
 
@@ -64,10 +66,38 @@ os.register_at_fork(after_in_child=_after_fork_in_child)
 
 
 def kernel(function: Callable[..., None]) -> wp.Kernel:
-    """Make ``function`` a Warp kernel: a module of its own, forward only (backward passes double compile time)."""
-    made = wp.kernel(function, module="unique", enable_backward=False)
-    KERNELS.append(made)
+    """Make ``function`` a Warp kernel: a module of its own, forward only (backward passes double compile time).
+
+    The module is named here. Warp's own way (``module="unique"``) names it by its content, for which it goes through
+    the kernel and all that it calls when it is defined, and once more when it is loaded.
+    """
+    with _state.defining:
+        made = wp.kernel(function, module=wp.Module(_module_name(function)), enable_backward=False)
+        KERNELS.append(made)
     return made
+
+
+def _module_name(function: Callable[..., None]) -> str:
+    """A name for a kernel's module that no other in this process has, and that it has in every process.
+
+    Warp keeps compiled kernels by this name and their content. Kernels that are made by a function are told apart by
+    their parameters and by what they take from it. Those that this cannot tell apart are numbered, and may be compiled
+    again in a process that makes them in another order.
+    """
+    taken = [*function.__annotations__.values(), *(cell.cell_contents for cell in function.__closure__ or ())]
+    words = [function.__module__, function.__qualname__, *(_in_a_word(value) for value in taken)]
+    name = f"{function.__name__}_{hashlib.sha256(' '.join(words).encode()).hexdigest()[:8]}"
+    count = _state.names[name] = _state.names.get(name, 0) + 1
+    return name if count == 1 else f"{name}_{count}"
+
+
+def _in_a_word(value: object) -> str:
+    """What a kernel takes from the function that makes it, or the type of a parameter, the same in every process."""
+    value = getattr(value, "dtype", value)  # of an array
+    name = getattr(value, "key", getattr(value, "__qualname__", None))  # Warp's functions and structs have keys
+    if name is None:
+        name = value if isinstance(value, (bool, int, float, str)) else type(value).__qualname__
+    return str(name)
 
 
 def once(make: Make) -> Make:

@@ -24,7 +24,11 @@ that paints the shading normal is whole with these lines::
 from __future__ import annotations
 
 import abc
+import ast
 import dataclasses
+import inspect
+import itertools
+import textwrap
 from typing import Annotated, Any, ClassVar
 
 import warp as wp
@@ -44,7 +48,7 @@ from ldtrefl.tracing.scene_bvh import SceneBvh
 from ldtrefl.tracing.tracer import SceneTracer
 from ldtrefl.world.device_scene import DeviceScene
 
-CONFIG = ConfigDict(extra="forbid", use_attribute_docstrings=True)
+CONFIG = ConfigDict(extra="forbid")
 """How every method's ``Config`` is checked."""
 
 
@@ -52,7 +56,7 @@ CONFIG = ConfigDict(extra="forbid", use_attribute_docstrings=True)
 class CommonConfig:
     """The options that every method has."""
 
-    # Described by ``Field``, because the classes that come from this one inherit no attribute docstrings.
+    # Described by ``Field``, because docstrings are read from the class that a method has.
     skip: Annotated[
         SkipChoice,
         Field(description=f"What is left out: all that can be, none, or a list of {', '.join(skip_names())}."),
@@ -117,8 +121,11 @@ class Method(abc.ABC):
     def options(cls) -> dict[str, tuple[Any, str]]:
         """Option -> (default, what it does)."""
         fields = cls.Config.__pydantic_fields__  # type: ignore[attr-defined]
+        words = _attribute_docstrings(cls.Config) | {
+            name: field.description for name, field in fields.items() if field.description
+        }
         return {
-            entry.name: (entry.default, " ".join((fields[entry.name].description or "").split()))
+            entry.name: (entry.default, " ".join(words.get(entry.name, "").split()))
             for entry in dataclasses.fields(cls.Config)
         }
 
@@ -129,15 +136,31 @@ class Method(abc.ABC):
         Raises:
             InputError: an option that the method does not have, or a value that is not allowed.
         """
+        allowed = [entry.name for entry in dataclasses.fields(cls.Config)]
         for name in options:
-            if name not in cls.options():
-                raise unknown_name(f"option of method {cls.name}", name, cls.options())
+            if name not in allowed:
+                raise unknown_name(f"option of method {cls.name}", name, allowed)
         try:
             return TypeAdapter(cls.Config).validate_python(options)
         except ValidationError as error:
             raise first_fault(error, {}).within(f"method {cls.name}") from None
         except InputError as error:
             raise error.within(f"method {cls.name}") from None
+
+
+def _attribute_docstrings(kind: type) -> dict[str, str]:
+    """Field -> the docstring under it, read from the source of a class; pydantic would read it at every import."""
+    (body,) = ast.parse(textwrap.dedent(inspect.getsource(kind))).body
+    assert isinstance(body, ast.ClassDef)
+    return {
+        field.target.id: docstring.value.value
+        for field, docstring in itertools.pairwise(body.body)
+        if isinstance(field, ast.AnnAssign)
+        and isinstance(field.target, ast.Name)
+        and isinstance(docstring, ast.Expr)
+        and isinstance(docstring.value, ast.Constant)
+        and isinstance(docstring.value.value, str)
+    }
 
 
 class RaylessMethod(Method):

@@ -42,7 +42,7 @@ from ldtrefl.scene import shapes
 from ldtrefl.scene.layout import Layout
 from ldtrefl.scene.mesh import Mesh
 from ldtrefl.scene.placement import placement
-from ldtrefl.scene.readers.mesh_files import load_mesh
+from ldtrefl.scene.readers import load_mesh
 
 MAX_SIDE = 16384
 """The most pixels along a side of an image."""

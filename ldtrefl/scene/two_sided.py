@@ -12,8 +12,6 @@ from __future__ import annotations
 
 import numpy as np
 import warp as wp
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from ldtrefl.base import budget
 
@@ -113,6 +111,9 @@ def _connected(vertices: np.ndarray, here: np.ndarray, ahead: np.ndarray, behind
         ahead: (k,) the next corner's place in each one's triangle.
         behind: (k,) the one's after that.
     """
+    from scipy.sparse import coo_array  # noqa: PLC0415  a fifth of a second, and few meshes need it
+    from scipy.sparse.csgraph import connected_components  # noqa: PLC0415
+
     count = len(here)
     # Each corner has two edges: its triangle leaves by the first and comes back by the second.
     corner = np.tile(np.arange(count), 2)

@@ -9,8 +9,6 @@ Moebius strip, stays as it is; so do parts that meet only at edges of three tria
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from ldtrefl.base import budget
 
@@ -27,6 +25,9 @@ def turned_triangles(places: np.ndarray) -> np.ndarray:
     Raises:
         InputError: it needs more memory than is allowed.
     """
+    from scipy.sparse import coo_array  # noqa: PLC0415  a fifth of a second, and few meshes need it
+    from scipy.sparse.csgraph import connected_components  # noqa: PLC0415
+
     count = len(places)
     budget.take(BYTES_PER_TRIANGLE * count, "the winding of triangles")
     one, other, is_alike = _pairs(places)

@@ -1,5 +1,7 @@
 """Launches: numbers of threads and items, one team for all who launch first, and what the system refuses."""
 
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Callable
@@ -102,3 +104,39 @@ def test_equal_arguments_make_one_kernel() -> None:
         return name * 2
 
     assert [make("a"), make("b"), make("a")] == ["aa", "bb", "aa"] and made == ["a", "b"]
+
+
+def adder(number: int) -> wp.Kernel:
+    """A kernel that adds ``number``, made by a function as kernels over a tracer are."""
+
+    @launch.kernel
+    def add(first: int, values_out: wp.array(dtype=float)):
+        """Each thread adds a number to one value."""
+        i = first + wp.tid()
+        values_out[i] = values_out[i] + float(number)
+
+    return add
+
+
+def test_kernels_of_one_name_are_told_apart_the_same_way_in_every_process() -> None:
+    """By what they take from the function that makes them: Warp would unload one for the other, or compile it anew."""
+    device = launch.resolve_device(None)
+    kernels = [adder(1), adder(10), adder(1)]
+    values = wp.zeros(3, dtype=float, device=device)
+    for kernel in [*kernels, *kernels]:
+        launch.launch(kernel, 3, [values], device)
+    np.testing.assert_array_equal(values.numpy(), [24.0, 24.0, 24.0])
+    names = [kernel.module.name for kernel in kernels]
+    assert len(set(names)) == 3 and names[2] == f"{names[0]}_2"
+    code = "from tests.device.test_launch import adder; print(*(adder(k).module.name for k in (10, 1)))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == [names[1], names[0]]
+
+
+def test_a_kernel_is_not_gone_through_before_it_is_needed() -> None:
+    """What it calls is hashed once, when it is loaded."""
+    kernel = adder(100)
+    assert not kernel.module.hashers and kernel.hash is None
+    device = launch.resolve_device(None)
+    launch.launch(kernel, 1, [wp.zeros(1, dtype=float, device=device)], device)
+    assert list(kernel.module.hashers) == [1]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from skimage.metrics import structural_similarity
 
 from ldtrefl.compare.metrics.base import metric
 from ldtrefl.files.srgb import srgb_from_linear
@@ -23,6 +22,8 @@ def ssim(image: np.ndarray, reference: np.ndarray, mask: np.ndarray) -> float:
         reference: (h, w, 3) linear radiance.
         mask: (h, w) bool.
     """
+    from skimage.metrics import structural_similarity  # noqa: PLC0415  a fifth of a second
+
     if not mask.any():
         return float("nan")
     short = [max(0, WINDOW - side) for side in mask.shape]

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from skimage import measure
 
 from ldtrefl.scene.mesh import Mesh
 from ldtrefl.scene.shapes.surfaces import fitted, outwards
@@ -19,6 +18,8 @@ def implicit(field: Callable[..., np.ndarray], extent: tuple[float, float, float
         extent: half the sides of the box about 0 that is searched.
         grid: cells along its longest side.
     """
+    from skimage import measure  # noqa: PLC0415  a tenth of a second
+
     cell = 2.0 * max(extent) / grid
     counts = [int(np.ceil(2.0 * side / cell)) + 1 for side in extent]
     axes = [(np.arange(n) - (n - 1) / 2.0) * cell for n in counts]
