@@ -1,7 +1,8 @@
 """Primary visibility: which point of which triangle each pixel sees.
 
-It is found by a z-buffer (``zbuffer.py``). To cast rays instead would need a BVH, whose build alone costs more than
-drawing once; ``tools/gbuffer_choice.py`` measures both. A large image is made in bands.
+It is found by a z-buffer (``zbuffer.py``). Triangles are drawn into it; in meshes whose triangles are many and small a
+method may have the pixels' rays searched for instead (``search_choice.py``), if it needs a tree over them anyway: to
+build one costs more than to draw once. ``tools/gbuffer_choice.py`` measures both. A large image is made in bands.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from ldtrefl.frame.gbuffer import GBuffer, GBufferView
 from ldtrefl.frame.pixel_box import BEHIND
 from ldtrefl.frame.pixel_order import BLOCK
 from ldtrefl.frame.projection import DrawnObject, corner_of, homogeneous
+from ldtrefl.frame.searched_pixels import CameraSearch, numbers_of
 from ldtrefl.frame.zbuffer import CornerRoom, Drawing
 from ldtrefl.geometry.perspective_raster import (
     HomogeneousTriangle,
@@ -62,6 +64,19 @@ def triangle_seen(
         homogeneous(corner_of(drawn, objects, corners, face[1])),
         homogeneous(corner_of(drawn, objects, corners, face[2])),
     )
+
+
+@wp.func
+def weights_inside(at: wp.vec3d) -> wp.vec3d:
+    """Weights of a triangle's corners that none is negative of: those of a pixel beside a triangle that was found to be
+    seen there by a search, which rounds to float32. A triangle that is seen edge on is seen in its middle."""
+    zero, one = wp.float64(0.0), wp.float64(1.0)
+    inside = wp.vec3d(
+        wp.where(at[0] > zero, at[0], zero), wp.where(at[1] > zero, at[1], zero), wp.where(at[2] > zero, at[2], zero)
+    )
+    if inside[0] + inside[1] + inside[2] == zero:
+        return wp.vec3d(one, one, one)
+    return inside
 
 
 @wp.func
@@ -130,7 +145,7 @@ def resolve_pixels(
             more = bool(True)
             while more:
                 pixel = pixel_of(i, width, first_row)
-                at = perspective_weights(tri, pixel[0], pixel[1])
+                at = weights_inside(perspective_weights(tri, pixel[0], pixel[1]))
                 total = at[0] + at[1] + at[2]
                 seen.object[i] = index
                 seen.triangle[i] = triangle
@@ -164,21 +179,23 @@ def resolved(drawing: Drawing, scene: DeviceScene) -> GBuffer:
     return GBuffer(scene, camera, view, drawing.band)
 
 
-def draw_gbuffer(scene: DeviceScene, camera: Camera) -> GBuffer:
-    """Draw what ``camera`` sees of the scene."""
-    drawing = Drawing(camera, whole_image(camera), CornerRoom.of(scene))
-    drawing.draw(scene, DrawnObjects.of(scene, camera, np.arange(len(scene.objects))))
+def draw_gbuffer(scene: DeviceScene, camera: Camera, search: CameraSearch | None = None) -> GBuffer:
+    """Draw what ``camera`` sees of the scene; its rays are searched for in those objects that ``search`` has."""
+    drawing = Drawing(camera, whole_image(camera), CornerRoom.of(scene, numbers_of(search)))
+    drawing.draw(scene, DrawnObjects.of(scene, camera, np.arange(len(scene.objects))), search)
     return resolved(drawing, scene)
 
 
-def draw_in_bands(scene: DeviceScene, camera: Camera, *, without: int = -1) -> Iterator[GBuffer]:
-    """Draw what ``camera`` sees of the scene, band by band from the top; object number ``without`` is left out."""
+def draw_in_bands(
+    scene: DeviceScene, camera: Camera, search: CameraSearch | None = None, *, without: int = -1
+) -> Iterator[GBuffer]:
+    """The same, band by band from the top; object number ``without`` is left out."""
     everything = np.arange(len(scene.objects))
     objects = DrawnObjects.of(scene, camera, everything[everything != without])
     rows = max(1, BAND_PIXELS // camera.width // BLOCK) * BLOCK
-    room = CornerRoom.of(scene)
+    room = CornerRoom.of(scene, numbers_of(search))
     for row in range(0, camera.height, rows):
         drawing = Drawing(camera, Band(row, min(rows, camera.height - row)), room)
         # Corners are the whole image's: those that are kept are found once.
-        drawing.draw(scene, objects, are_projected=row > 0 and room.keeps)
+        drawing.draw(scene, objects, search, are_projected=row > 0 and room.keeps)
         yield resolved(drawing, scene)

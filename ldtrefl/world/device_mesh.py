@@ -35,6 +35,12 @@ class DeviceMesh:
         return float(np.sqrt((used**2).sum(axis=1).max()))
 
     @functools.cached_property
+    def unit_bounds(self) -> np.ndarray:
+        """(2, 3) float64: the lowest and highest corner of the box about all triangles, in unit space."""
+        centre, half = self.mesh.unit_frame
+        return (self.mesh.bounds - centre) / half
+
+    @functools.cached_property
     def outliers(self) -> Outliers:
         """The mesh's triangles far outside its bulk."""
         return outliers_of(self.mesh, self.vertices.device)
