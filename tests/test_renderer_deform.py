@@ -135,7 +135,10 @@ def test_nothing_of_earlier_frames_is_kept(cache: MapCache) -> None:
     given = scene()
     given = Scene(
         camera=given.camera,
-        objects=(*given.objects[:1], Object(name="knot", mesh=fine, scale=0.5, translate=(1.5, -1, 0))),
+        objects=(
+            Object(name="ball", shape="sphere", params={"segments": [60, 30]}, material=Material(mirror=0.9)),
+            Object(name="knot", mesh=fine, scale=0.5, translate=(1.5, -1, 0)),
+        ),
     )
     for method in ("ldt", "bvh"):
         renderer = ldtrefl.Renderer(given, method)

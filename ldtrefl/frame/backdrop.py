@@ -9,6 +9,7 @@ import warp as wp
 
 from ldtrefl.device.native_sources import native_body
 from ldtrefl.frame.gbuffer import pixel_ray
+from ldtrefl.geometry.vectors import as_single
 from ldtrefl.shading.environment import environment_radiance
 from ldtrefl.world.camera import CameraView, camera_ray
 from ldtrefl.world.records import LightingRecord
@@ -53,13 +54,13 @@ def fill_backdrop(
         row = i / camera.width
         rest = wp.min(end, (row + 1) * camera.width)
         if lighting.image_size[0] == 0:
-            middle = camera_ray(camera, 0.5 * float(camera.width), float(row) + 0.5)
+            half = wp.float64(0.5)
+            middle = as_single(camera_ray(camera, half * wp.float64(camera.width), wp.float64(row) + half))
+            right = as_single(camera.right)
             rise, x = lighting.sky - lighting.ground, i - row * camera.width
-            fill_gradient(
-                middle, camera.right, camera.width, lighting.up, lighting.ground, rise, x, rest - i, i, radiance_out
-            )
+            fill_gradient(middle, right, camera.width, lighting.up, lighting.ground, rise, x, rest - i, i, radiance_out)
             i = rest
         else:
             while i < rest:
-                radiance_out[i] = environment_radiance(lighting, wp.normalize(pixel_ray(camera, i)))
+                radiance_out[i] = environment_radiance(lighting, wp.normalize(as_single(pixel_ray(camera, i))))
                 i += 1

@@ -30,10 +30,11 @@ class GBufferView:
 
 
 @wp.func
-def pixel_ray(camera: CameraView, pixel: int) -> wp.vec3:
+def pixel_ray(camera: CameraView, pixel: int) -> wp.vec3d:
     """Direction through a pixel's centre."""
-    width = camera.width
-    return camera_ray(camera, float(pixel % width) + 0.5, float(pixel / width) + 0.5)
+    row = pixel / camera.width
+    half = wp.float64(0.5)
+    return camera_ray(camera, wp.float64(pixel - row * camera.width) + half, wp.float64(row) + half)
 
 
 @wp.func
@@ -41,7 +42,7 @@ def sight(gbuffer: GBufferView, pixel: int, sightings: wp.array(dtype=Sighting),
     """Let a lane of a group see what a pixel sees."""
     sightings[lane].object = gbuffer.object[pixel]
     sightings[lane].triangle = gbuffer.triangle[pixel]
-    sightings[lane].view = pixel_ray(gbuffer.camera, pixel)
+    sightings[lane].way = pixel_ray(gbuffer.camera, pixel)
 
 
 @launch.kernel

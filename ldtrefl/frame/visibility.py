@@ -1,7 +1,8 @@
 """Primary visibility: which point of which triangle each pixel sees.
 
-It is found by a z-buffer (``zbuffer.py``). To cast rays instead would need a BVH, whose build alone costs more than
-drawing once; ``tools/gbuffer_choice.py`` measures both. A large image is made in bands.
+It is found by a z-buffer (``zbuffer.py``). Triangles are drawn into it; in meshes whose triangles are many and small a
+method may have the pixels' rays searched for instead (``search_choice.py``), if it needs a tree over them anyway: to
+build one costs more than to draw once. ``tools/gbuffer_choice.py`` measures both. A large image is made in bands.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from ldtrefl.frame.gbuffer import GBuffer, GBufferView
 from ldtrefl.frame.pixel_box import BEHIND
 from ldtrefl.frame.pixel_order import BLOCK
 from ldtrefl.frame.projection import DrawnObject, corner_of, homogeneous
+from ldtrefl.frame.searched_pixels import CameraSearch, numbers_of
 from ldtrefl.frame.zbuffer import CornerRoom, Drawing
 from ldtrefl.geometry.perspective_raster import (
     HomogeneousTriangle,
@@ -150,21 +152,23 @@ def resolved(drawing: Drawing, scene: DeviceScene) -> GBuffer:
     return GBuffer(scene, camera, view, drawing.band)
 
 
-def draw_gbuffer(scene: DeviceScene, camera: Camera) -> GBuffer:
-    """Draw what ``camera`` sees of the scene."""
-    drawing = Drawing(camera, whole_image(camera), CornerRoom.of(scene))
-    drawing.draw(scene, DrawnObjects.of(scene, camera, np.arange(len(scene.objects))))
+def draw_gbuffer(scene: DeviceScene, camera: Camera, search: CameraSearch | None = None) -> GBuffer:
+    """Draw what ``camera`` sees of the scene; its rays are searched for in those objects that ``search`` has."""
+    drawing = Drawing(camera, whole_image(camera), CornerRoom.of(scene, numbers_of(search)))
+    drawing.draw(scene, DrawnObjects.of(scene, camera, np.arange(len(scene.objects))), search)
     return resolved(drawing, scene)
 
 
-def draw_in_bands(scene: DeviceScene, camera: Camera, *, without: int = -1) -> Iterator[GBuffer]:
-    """Draw what ``camera`` sees of the scene, band by band from the top; object number ``without`` is left out."""
+def draw_in_bands(
+    scene: DeviceScene, camera: Camera, search: CameraSearch | None = None, *, without: int = -1
+) -> Iterator[GBuffer]:
+    """The same, band by band from the top; object number ``without`` is left out."""
     everything = np.arange(len(scene.objects))
     objects = DrawnObjects.of(scene, camera, everything[everything != without])
     rows = max(1, BAND_PIXELS // camera.width // BLOCK) * BLOCK
-    room = CornerRoom.of(scene)
+    room = CornerRoom.of(scene, numbers_of(search))
     for row in range(0, camera.height, rows):
         drawing = Drawing(camera, Band(row, min(rows, camera.height - row)), room)
         # Corners are the whole image's: those that are kept are found once.
-        drawing.draw(scene, objects, are_projected=row > 0 and room.keeps)
+        drawing.draw(scene, objects, search, are_projected=row > 0 and room.keeps)
         yield resolved(drawing, scene)

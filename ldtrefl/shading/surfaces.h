@@ -67,6 +67,7 @@ struct Surfaces : Vectors {
     }
     SHARED ThreeDouble minus(const ThreeDouble& a, const ThreeDouble& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
     SHARED ThreeDouble doubled_of(const Three& a) { return {doubled(a.x), doubled(a.y), doubled(a.z)}; }
+    SHARED Three single_of(const ThreeDouble& a) { return {single(a.x), single(a.y), single(a.z)}; }
     // The linear part of a matrix of 3 rows of 4, times a vector.
     SHARED ThreeDouble turned(const double* m, const ThreeDouble& a) {
         return {
@@ -120,7 +121,7 @@ struct Surfaces : Vectors {
     // The points where rays from an eye in device space meet their triangles (Moeller and Trumbore 1997). What a ray
     // misses by rounding is put on the triangle's edge.
     SHARED void place_on_rays(
-        const Object& object, const int* triangle, const double* eye, const Three& ray, Points& made
+        const Object& object, const int* triangle, const double* eye, const ThreeDouble& ray, Points& made
     ) {
         const WideDouble zero = wide_double(0.0), one = wide_double(1.0);
         const ThreeDouble a = exact_corner(object, triangle, made, 0);
@@ -130,7 +131,7 @@ struct Surfaces : Vectors {
         double from[3];
         for (int row = 0; row < 3; ++row)
             from[row] = m[4 * row] * eye[0] + m[4 * row + 1] * eye[1] + m[4 * row + 2] * eye[2] + m[4 * row + 3];
-        const ThreeDouble way = turned(m, doubled_of(ray));
+        const ThreeDouble way = turned(m, ray);
         const ThreeDouble offset = minus({wide_double(from[0]), wide_double(from[1]), wide_double(from[2])}, a);
         const ThreeDouble p = cross(way, ac), q = cross(offset, ab);
         const WideDouble scale = one / dot(ab, p);

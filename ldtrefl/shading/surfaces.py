@@ -29,7 +29,8 @@ class Sighting:
     triangle: int
     u: float  # barycentrics
     v: float
-    view: wp.vec3
+    view: wp.vec3  # unit; 0 if the eye touches the point
+    way: wp.vec3d  # the same of any length, for what is looked at from an eye
 
 
 CONSTANTS: dict[str, float | int] = {"SMALLEST_NORMAL": SMALLEST_NORMAL}
@@ -47,22 +48,24 @@ object.unit_from_device = &record.unit_from_device.data[0][0];
 object.normal_from_unit = &record.normal_from_unit.data[0][0];
 // Lanes that are not asked for do what the first one does that is.
 int lane[Surfaces::WIDE], triangle[Surfaces::WIDE];
-Surfaces::Three way;
 for (int i = 0; i < Surfaces::WIDE; ++i) {
     lane[i] = lanes >> i & 1 ? i : Surfaces::lowest_bit(lanes);
-    const auto& sighting = sightings.data[lane[i]];
-    triangle[i] = sighting.triangle;
-    way.x[i] = sighting.view[0];
-    way.y[i] = sighting.view[1];
-    way.z[i] = sighting.view[2];
+    triangle[i] = sightings.data[lane[i]].triangle;
 }
 Surfaces::Points at;
 Surfaces::find_corners(object, triangle, at);
 """
 FROM_EYE = """
 const double from[3] = {eye[0], eye[1], eye[2]};
+Surfaces::ThreeDouble way;
+for (int i = 0; i < Surfaces::WIDE; ++i) {
+    const auto& along = sightings.data[lane[i]].way;
+    way.x[i] = along[0];
+    way.y[i] = along[1];
+    way.z[i] = along[2];
+}
 Surfaces::place_on_rays(object, triangle, from, way, at);
-const Surfaces::Three view = Surfaces::unit(way);
+const Surfaces::Three view = Surfaces::unit(Surfaces::single_of(way));
 for (int i = 0; i < Surfaces::WIDE; ++i) {
     auto& sighting = sightings.data[lane[i]];
     sighting.view = wp::vec3(view.x[i], view.y[i], view.z[i]);
@@ -72,12 +75,16 @@ for (int i = 0; i < Surfaces::WIDE; ++i) {
 """
 ALONG = """
 Surfaces::Wide u, v;
+Surfaces::Three view;
 for (int i = 0; i < Surfaces::WIDE; ++i) {
-    u[i] = sightings.data[lane[i]].u;
-    v[i] = sightings.data[lane[i]].v;
+    const auto& sighting = sightings.data[lane[i]];
+    u[i] = sighting.u;
+    v[i] = sighting.v;
+    view.x[i] = sighting.view[0];
+    view.y[i] = sighting.view[1];
+    view.z[i] = sighting.view[2];
 }
 Surfaces::place_at(object, u, v, at);
-const Surfaces::Three view = way;
 """
 STORE = """
 const Surfaces::Found found = Surfaces::normals_at(object, at, view);
@@ -103,7 +110,7 @@ def surfaces_of_object_from(
     surfaces: wp.array(dtype=Surface),
 ):
     """Find the surface of object ``k`` for these lanes, a bit each, which see its triangles from ``eye`` along their
-    views; then their barycentrics, and views of unit length."""
+    ways; and their barycentrics and views."""
     ...
 
 
@@ -140,7 +147,7 @@ def look_from(
     surfaces: wp.array(dtype=Surface),
 ):
     """Find the surfaces, but for their colours, that these lanes see, a bit each: where rays from ``eye`` along their
-    views meet their triangles. Then their barycentrics are set, and their views have unit length."""
+    ways meet their triangles. Their barycentrics and views are set, too."""
     left = lanes
     while left != 0:
         k = sightings[lowest_bit(wp.uint64(left))].object

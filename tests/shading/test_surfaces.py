@@ -16,6 +16,7 @@ from ldtrefl.world.records import ObjectRecord
 
 CAMERA = Camera(eye=(0.0, -5.0, 1.0), look_at=(0.0, 0.0, 0.0))
 ROUNDED = 2e-6
+VECTORS = {"view": wp.vec3, "way": wp.vec3d}
 
 
 @launch.kernel
@@ -46,7 +47,9 @@ def seen(scene: DeviceScene, sightings: list[dict], lanes: int, *, eye: np.ndarr
     for values in sightings:
         struct = Sighting()
         for name, value in values.items():
-            setattr(struct, name, wp.vec3(*value) if name == "view" else value)
+            setattr(
+                struct, name, {"view": wp.vec3, "way": wp.vec3d}[name](*value) if name in ("view", "way") else value
+            )
         structs.append(struct)
     device = launch.resolve_device(None)
     given, after = (wp.array(structs, dtype=Sighting, device=device) for _ in range(2))
@@ -100,8 +103,7 @@ def test_what_an_eye_sees(lanes: int, offset: float) -> None:
         k, triangle = int(rng.integers(2)), int(rng.integers(40))
         weight = rng.dirichlet((1, 1, 1))
         point = weight @ corners_of(scene, k, triangle)[0]
-        view = ((point - eye) * rng.uniform(0.1, 2.0)).astype(np.float32)
-        sightings.append({"object": k, "triangle": triangle, "view": view})
+        sightings.append({"object": k, "triangle": triangle, "way": (point - eye) * rng.uniform(0.1, 2.0)})
         points.append(point)
         weights.append(weight)
     after, surfaces = seen(scene, sightings, lanes, eye=eye)
@@ -155,9 +157,9 @@ def test_a_ray_that_misses_by_rounding_or_runs_along_the_triangle_stays_on_it() 
     eye = middle + 3.0 * across / np.linalg.norm(across)
     beside = corners[0] + 1e-4 * (corners[0] - middle) - eye  # past a corner
     along = corners[1] - corners[0]  # never meets the plane
-    views = {"object": 0, "triangle": 3}
+    which = {"object": 0, "triangle": 3}
     after, surfaces = seen(
-        scene, [{**views, "view": view} for view in (beside, along, np.zeros(3))] * 2, 0b111111, eye=eye
+        scene, [{**which, "way": way} for way in (beside, along, np.zeros(3))] * 2, 0b111111, eye=eye
     )
     np.testing.assert_allclose(surfaces[0]["position"], corners[0], atol=1e-3)
     for sighting, surface in zip(after, surfaces, strict=False):

@@ -9,7 +9,8 @@
 //     single_rays.h   one ray down the tree, the nearest child first
 //     packets.h       rays that stay together: a node's boxes are tested against all of them at once
 //     rays_in_turn.h  rays that do not, a step each, so that memory works for the others while one waits
-//     walk.h          which of these three a ray takes
+//     packets_in_turn.h   packets, in the same way
+//     walk.h          which of these a ray takes
 //     answer.h        what a ray's record says of its hit
 //
 // Which way a ray takes changes no bit of its answer: the record alone decides where it is met, and of two records at

@@ -102,6 +102,7 @@ FILES = (
     "ldt/exact/single_rays.h",
     "ldt/exact/packets.h",
     "ldt/exact/rays_in_turn.h",
+    "ldt/exact/packets_in_turn.h",
     "ldt/exact/walk.h",
     "ldt/exact/answer.h",
 )
