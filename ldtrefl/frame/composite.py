@@ -12,6 +12,14 @@ PIXELS_TOGETHER = 4096
 """Pixels that one thread of a CPU copies."""
 
 
+@wp.func_native("""
+memcpy(&image_out.data[begin], &radiance.data[begin], (end - begin) * sizeof(image_out.data[0]));
+""")
+def copy_run(radiance: wp.array(dtype=wp.vec3), begin: int, end: int, image_out: wp.array(dtype=wp.vec3)):
+    """Copy the pixels from ``begin`` to ``end``, as the C library does."""
+    ...
+
+
 @launch.kernel
 def copy_pixels(
     first: int,
@@ -23,8 +31,7 @@ def copy_pixels(
 ):
     """Copy a block of pixels."""
     begin = block * (first + wp.tid())
-    for i in range(begin, wp.min(begin + block, radiance.shape[0])):
-        image_out[i] = radiance[i]
+    copy_run(radiance, begin, wp.min(begin + block, radiance.shape[0]), image_out)
 
 
 @launch.kernel

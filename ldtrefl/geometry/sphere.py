@@ -11,15 +11,21 @@ from ldtrefl.geometry.vectors import as_double
 
 
 @wp.func
-def meets_sphere(origin: wp.vec3d, direction: wp.vec3, centre: wp.vec3d, radius: float) -> bool:
-    """Whether a ray meets a sphere, or begins inside it: the same answer as ``sphere_entry``'s without its root."""
+def enters_sphere(origin: wp.vec3d, direction: wp.vec3, centre: wp.vec3d, radius: float, t_max: float) -> bool:
+    """Whether a ray enters a sphere before ``t_max``, or begins inside it: as ``sphere_entry`` tells, without its
+    root."""
     offset, way = centre - origin, as_double(direction)
     square = wp.float64(radius) * wp.float64(radius)
-    if wp.dot(offset, way) < wp.float64(0.0) and wp.dot(offset, offset) > square:
+    if wp.dot(offset, offset) <= square:
+        return True
+    along = wp.dot(offset, way)
+    if along < wp.float64(0.0):
         return False  # the sphere lies behind
     # |offset x way| is the distance of the centre from the ray, in lengths of the direction.
-    aside = wp.cross(offset, way)
-    return wp.dot(aside, aside) <= square * wp.dot(way, way)
+    aside, length_squared = wp.cross(offset, way), wp.dot(way, way)
+    half_chord_squared = square * length_squared - wp.dot(aside, aside)
+    past = along - wp.float64(t_max) * length_squared
+    return half_chord_squared >= wp.float64(0.0) and (past <= wp.float64(0.0) or past * past <= half_chord_squared)
 
 
 @wp.func

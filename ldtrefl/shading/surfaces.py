@@ -88,6 +88,7 @@ Surfaces::place_at(object, u, v, at);
 """
 STORE = """
 const Surfaces::Found found = Surfaces::normals_at(object, at, view);
+const auto albedo = wp::cw_mul(record.albedo, record.part_color.data[0]);
 for (int i = 0; i < Surfaces::WIDE; ++i) {
     auto& surface = surfaces.data[lane[i]];
     surface.object = k;
@@ -96,6 +97,9 @@ for (int i = 0; i < Surfaces::WIDE; ++i) {
     surface.normal = wp::vec3(found.normal.x[i], found.normal.y[i], found.normal.z[i]);
     surface.facet = wp::vec3(found.facet.x[i], found.facet.y[i], found.facet.z[i]);
     surface.is_back = found.is_back[i] != 0;
+    surface.albedo = albedo;
+    surface.emission = record.emission;
+    surface.mirror = record.mirror;
 }
 """
 
@@ -146,8 +150,8 @@ def look_from(
     sightings: wp.array(dtype=Sighting),
     surfaces: wp.array(dtype=Surface),
 ):
-    """Find the surfaces, but for their colours, that these lanes see, a bit each: where rays from ``eye`` along their
-    ways meet their triangles. Their barycentrics and views are set, too."""
+    """Find the surfaces that these lanes see, a bit each: where rays from an eye along their ways meet their triangles.
+    Their barycentrics and views are set, too. ``color_surface`` sets what is left."""
     left = lanes
     while left != 0:
         k = sightings[lowest_bit(wp.uint64(left))].object
@@ -163,7 +167,8 @@ def look_along(
     sightings: wp.array(dtype=Sighting),
     surfaces: wp.array(dtype=Surface),
 ):
-    """Find the surfaces, but for their colours, at these lanes' barycentrics, a bit each, along their views."""
+    """Find the surfaces at these lanes' barycentrics, a bit each, along their views. ``color_surface`` sets what is
+    left."""
     left = lanes
     while left != 0:
         k = sightings[lowest_bit(wp.uint64(left))].object
@@ -179,15 +184,14 @@ def color_surface(
     lane: int,
     surfaces: wp.array(dtype=Surface),
 ):
-    """Fill in the colours of a lane's surface."""
-    index, triangle = sightings[lane].object, sightings[lane].triangle
-    u, v = sightings[lane].u, sightings[lane].v
-    surfaces[lane].albedo = albedo_at(objects, index, triangle, u, v)
-    surfaces[lane].emission = objects[index].emission
-    mirror = objects[index].mirror
+    """Set those colours of a lane's surface that are not the same on all of its object."""
+    index = sightings[lane].object
+    if objects[index].part_first.shape[0] > 1 or objects[index].part_texture[0][1] > 0:
+        u, v = sightings[lane].u, sightings[lane].v
+        surfaces[lane].albedo = albedo_at(objects, index, sightings[lane].triangle, u, v)
     if objects[index].fresnel != 0:
-        mirror = schlick(mirror, -wp.dot(surfaces[lane].normal, sightings[lane].view))
-    surfaces[lane].mirror = mirror
+        cosine = -wp.dot(surfaces[lane].normal, sightings[lane].view)
+        surfaces[lane].mirror = schlick(objects[index].mirror, cosine)
 
 
 def group_on(device: wp.Device) -> int:

@@ -11,7 +11,7 @@ import warp as wp
 
 from ldtrefl.device import launch
 from ldtrefl.device.bits import lowest_bit
-from ldtrefl.geometry.sphere import meets_sphere, sphere_entry
+from ldtrefl.geometry.sphere import enters_sphere, sphere_entry
 from ldtrefl.geometry.vectors import as_single
 from ldtrefl.tracing.hit import Hit
 from ldtrefl.tracing.object_sets import RUN, ObjectSets, is_listed, object_listed, objects_listed
@@ -70,20 +70,17 @@ def can_meet(sets: ObjectSets, rays: RayBuffer, run: int, entry: int, k: int, i:
 @wp.func
 def may_meet(record: ObjectRecord, origin: wp.vec3d, direction: wp.vec3, t_max: float) -> bool:
     """Whether a ray enters the bounding sphere of an object before ``t_max``."""
-    if t_max == wp.inf:
-        return meets_sphere(origin, direction, record.centre, record.radius)  # needs no root
-    entry = sphere_entry(origin, direction, record.centre, record.radius)
-    return entry >= 0.0 and entry <= t_max
+    return enters_sphere(origin, direction, record.centre, record.radius, t_max)
 
 
 @launch.once
-def query_of(tracer: Tracer) -> Callable[..., Query]:
-    """``query_for(views, objects, k, rays, i, ray, t_max)``: what object ``k`` is asked about ray ``i``, which is
-    ``ray`` there, up to ``t_max``."""
+def ask_of(tracer: Tracer) -> Callable[..., None]:
+    """``ask(views, objects, k, rays, i, ray, t_max, queries, place)``: write what object ``k`` is asked about ray
+    ``i``, which is ``ray`` there, up to ``t_max``."""
     leaving = tracer.leaving
 
     @wp.func
-    def query_for(
+    def ask(
         views: wp.array(dtype=tracer.view),
         objects: wp.array(dtype=ObjectRecord),
         k: int,
@@ -91,20 +88,21 @@ def query_of(tracer: Tracer) -> Callable[..., Query]:
         i: int,
         ray: UnitRay,
         t_max: float,
-    ) -> Query:
-        query = Query()
-        query.origin = ray.origin
-        query.direction = ray.direction
+        queries: wp.array(dtype=Query),
+        place: int,
+    ):
+        # Field by field: a struct that is copied as a whole waits for all of its fields to be in memory.
+        queries[place].origin = ray.origin
+        queries[place].direction = ray.direction
         # t stays in device units: divide by the direction's length in unit space.
-        query.t_max = t_max * ray.stretch
+        queries[place].t_max = t_max * ray.stretch
         if rays.source[i] == k:
             triangle = rays.source_triangle[i]
             outwards = facet_towards(objects[k], triangle, ray.direction)
-            query.origin = start_above_own(objects[k], triangle, ray.origin, outwards)
-            query = leaving(views, k, query, as_single(outwards))
-        return query
+            queries[place].origin = start_above_own(objects[k], triangle, ray.origin, outwards)
+            queries[place] = leaving(views, k, queries[place], as_single(outwards))
 
-    return query_for
+    return ask
 
 
 @wp.func
@@ -135,7 +133,7 @@ def keep_found(
 def closest_hits_kernel(tracer: Tracer, block: int, bounds: bool = True) -> wp.Kernel:
     """The kernel that finds where rays end; one item follows ``block`` rays. With ``bounds`` an object is searched only
     for rays that enter its sphere before their nearest hit so far; of a group the first entered comes first."""
-    find_hits, query_for = tracer.closest_hits, query_of(tracer)
+    find_hits, ask = tracer.closest_hits, ask_of(tracer)
     size, to_infinity = wp.constant(block), wp.constant(not bounds)
 
     @launch.kernel
@@ -178,7 +176,7 @@ def closest_hits_kernel(tracer: Tracer, block: int, bounds: bool = True) -> wp.K
                         if to_infinity or may_meet(objects[k], rays.origin[i], rays.direction[i], hits.t[i]):
                             t_max = wp.where(to_infinity, wp.inf, BEYOND * hits.t[i])
                             ray = into_unit(objects[k], rays.origin[i], rays.direction[i])
-                            queries[count] = query_for(views, objects, k, rays, i, ray, t_max)
+                            ask(views, objects, k, rays, i, ray, t_max, queries, count)
                             searched[count] = i
                             stretches[count] = ray.stretch
                             count += 1

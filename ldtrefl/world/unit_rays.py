@@ -40,7 +40,7 @@ def into_unit(record: ObjectRecord, origin: wp.vec3d, direction: wp.vec3) -> Uni
     scaled = record.unit_from_direction * direction
     length = wp.length(scaled)
     ray.stretch = length * record.unit_per_device
-    ray.direction = scaled / length
+    ray.direction = (1.0 / length) * scaled
     ray.origin = wp.transform_point(record.unit_from_device, origin)
     return ray
 

@@ -5,7 +5,7 @@ import pytest
 import warp as wp
 
 from ldtrefl.device import launch
-from ldtrefl.geometry.sphere import meets_sphere, sphere_entry
+from ldtrefl.geometry.sphere import enters_sphere, sphere_entry
 
 CENTRE, RADIUS = np.array([1.0, -2.0, 0.5]), 1.5
 
@@ -18,6 +18,7 @@ def meet(
     directions: wp.array(dtype=wp.vec3),
     centre: wp.vec3d,
     radius: float,
+    t_max: float,
     # Out:
     t_out: wp.array(dtype=float),
     meets_out: wp.array(dtype=bool),
@@ -25,15 +26,15 @@ def meet(
     """Each thread tests one ray."""
     i = first + wp.tid()
     t_out[i] = sphere_entry(origins[i], directions[i], centre, radius)
-    meets_out[i] = meets_sphere(origins[i], directions[i], centre, radius)
+    meets_out[i] = enters_sphere(origins[i], directions[i], centre, radius, t_max)
 
 
-def met(origins: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(t of entry, whether the sphere is met) of rays."""
+def met(origins: np.ndarray, directions: np.ndarray, t_max: float = np.inf) -> tuple[np.ndarray, np.ndarray]:
+    """(t of entry, whether the sphere is entered before ``t_max``) of rays."""
     device = launch.resolve_device(None)
     given = [wp.array(origins, dtype=wp.vec3d, device=device), wp.array(directions, dtype=wp.vec3, device=device)]
     t, meets = wp.zeros(len(origins), dtype=float, device=device), wp.zeros(len(origins), dtype=bool, device=device)
-    launch.launch(meet, len(origins), [*given, wp.vec3d(*CENTRE), RADIUS, t, meets], device)
+    launch.launch(meet, len(origins), [*given, wp.vec3d(*CENTRE), RADIUS, t_max, t, meets], device)
     return t.numpy(), meets.numpy()
 
 
@@ -70,3 +71,8 @@ def test_random_rays_against_the_quadratic() -> None:
     np.testing.assert_array_equal(meets[sure], is_met[sure])
     np.testing.assert_array_equal(t[sure] >= 0, is_met[sure])
     np.testing.assert_allclose(t[sure & is_met], np.maximum(-b - root, 0)[sure & is_met], atol=1e-4)
+    for t_max in (0.0, 0.5, 2.0, 4.0):
+        _, before = met(origins, directions, t_max)
+        certain = sure & (np.abs(np.maximum(-b - root, 0) - t_max) > 1e-5)
+        np.testing.assert_array_equal(before[certain], (is_met & (np.maximum(-b - root, 0) < t_max))[certain])
+        assert 0.0 < before.mean() < is_met.mean()
