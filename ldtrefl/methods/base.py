@@ -108,6 +108,10 @@ class Method(abc.ABC):
         """Go on with a scene in which some objects have moved, their meshes and all else the same."""
         self.scene = scene
 
+    def first_kernels(self) -> list[wp.Kernel]:
+        """Kernels that a first frame will need, those first that take longest to compile: they are compiled ahead."""
+        return []
+
     def foresee(self, gbuffer: GBuffer, stats: Stats) -> None:  # noqa: B027  (most methods have nothing to foresee)
         """Make the tracer ready for what the camera sees. Called before shadow rays are asked of it, only if the scene
         has shadows."""

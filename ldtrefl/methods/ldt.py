@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Literal
 
+import warp as wp
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
@@ -25,13 +26,22 @@ from ldtrefl.device.stats import Stats
 from ldtrefl.frame.bounce_hits import FirstHits
 from ldtrefl.frame.bounces import BounceLimits, RayFollower, summed_by_pixel
 from ldtrefl.frame.camera_shading import first_rays
+from ldtrefl.frame.first_frame import kernels_of_rays
 from ldtrefl.frame.flat_regions import flat_regions
 from ldtrefl.frame.footprint import finest_footprints
 from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.history import Reusable
 from ldtrefl.frame.reflected_light import ReflectedLight
 from ldtrefl.frame.refollow import followed_with_history
-from ldtrefl.frame.regions import FEW_OBJECTS, Regions, all_objects, objects_that_rays_meet, safe_regions
+from ldtrefl.frame.regions import (
+    FEW_OBJECTS,
+    Regions,
+    all_objects,
+    cull_runs,
+    objects_that_rays_meet,
+    safe_regions,
+)
+from ldtrefl.ldt.exact.build import KERNELS as TREE_KERNELS
 from ldtrefl.ldt.options import (
     BINARY_STEPS,
     DEFAULT_QUALITY,
@@ -44,6 +54,7 @@ from ldtrefl.ldt.options import (
 )
 from ldtrefl.ldt.resolution import resolutions_for
 from ldtrefl.ldt.scene_maps import MapOptions, SceneMaps
+from ldtrefl.ldt.searches import TRACERS
 from ldtrefl.methods.base import CONFIG, CommonConfig, RayConfig, RayMethod
 from ldtrefl.tracing.ray_buffers import RayBuffer
 from ldtrefl.tracing.tracer import BoundTracer, SceneTracer
@@ -94,6 +105,11 @@ class Ldt(RayMethod):
         """Go on with a scene in which some objects have moved."""
         super().place(scene)
         self._has_moved = True
+
+    def first_kernels(self) -> list[wp.Kernel]:
+        """What searches for the rays, and what peels for the usual search."""
+        search, *others = kernels_of_rays(self.scene, TRACERS[self.config.search], self.skip)
+        return [search, *(TREE_KERNELS if self.config.search == "exact" else ()), *others, cull_runs]
 
     def foresee(self, gbuffer: GBuffer, stats: Stats) -> None:
         """Choose maps for the frame's shadows that are as fine as its reflections need them, too."""

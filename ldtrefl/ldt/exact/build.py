@@ -12,11 +12,18 @@ import warp as wp
 from ldtrefl.base.budget import memory_limit
 from ldtrefl.base.errors import InputError
 from ldtrefl.ldt.exact.backs_check import shows_backs
-from ldtrefl.ldt.exact.binary_tree import binary_tree
+from ldtrefl.ldt.exact.binary_tree import (
+    binary_tree,
+    measure_cells,
+    number_cells,
+    sort_by_cell,
+    split_cells,
+    split_groups,
+)
 from ldtrefl.ldt.exact.record_choice import PatchRecords, choose_records
 from ldtrefl.ldt.exact.records import Records
 from ldtrefl.ldt.exact.tree import Tree
-from ldtrefl.ldt.exact.wide_tree import wide_tree
+from ldtrefl.ldt.exact.wide_tree import gather_nodes, wide_tree, write_nodes
 from ldtrefl.ldt.options import Quality
 from ldtrefl.world.device_mesh import DeviceMesh
 
@@ -24,6 +31,10 @@ BYTES_PER_RECORD = 80
 """What a record takes in the tree and while that is built, at most."""
 MOST_RECORDS = 100_000_000
 """Records of a tree: twice the number of a block's first row fits in an int32."""
+
+
+KERNELS = (write_nodes, split_groups, measure_cells, number_cells, split_cells, gather_nodes, sort_by_cell)
+"""Those of a tree over triangles."""
 
 
 def build_tree(geometry: DeviceMesh, resolution: int, quality: Quality, *, trusted: bool = False) -> Tree:
