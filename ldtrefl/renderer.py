@@ -190,8 +190,9 @@ class Renderer:
             stats.seconds.update(dict.fromkeys(parts.stages, 0.0))
         else:
             reusable = self._history.reusable(scene, camera)
+            search = self._method.camera_search(scene, camera, stats)
             with stats.stage("gbuffer", scene.device):
-                gbuffer = self._history.gbuffer(scene, camera)
+                gbuffer = self._history.gbuffer(scene, camera, search)
             parts = self._parts(gbuffer, reusable, stats)
         image = self._composed(parts, stats)
         self._history.keep(scene, camera, parts)
@@ -222,7 +223,7 @@ class Renderer:
         """A large image from top to bottom; nothing of it, nor of the last frame, is kept."""
         scene = self._looking_from(camera)
         self._history.forget()
-        bands = draw_in_bands(scene, camera)
+        bands = draw_in_bands(scene, camera, self._method.camera_search(scene, camera, stats))
         while True:
             with stats.stage("gbuffer", scene.device):
                 gbuffer = next(bands, None)
@@ -279,7 +280,7 @@ class Renderer:
             scene, camera = view
             pixels = camera.width * camera.height
             budget.take(WORKING_BYTES // 4 * pixels, f"a G-buffer of {camera.width} x {camera.height}", SMALLER)
-            return draw_gbuffer(scene, camera)
+            return draw_gbuffer(scene, camera, self._method.camera_search(scene, camera, Stats()))
 
     def texel_sizes(self, resolution: int) -> np.ndarray:
         """(objects,) length in the world of a texel of each object's maps at ``resolution``."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from picture_edges import near_edge
 
 Points = np.ndarray
 """(n, 3)"""
@@ -136,7 +137,4 @@ def seen(
         if bounce == most:
             radiance[goes_on] += weight[goes_on, None] * environment(d[goes_on])
     met_by_pixel = np.stack(signs, axis=-1).reshape(*shape, most + 1)
-    wide = np.pad(met_by_pixel, ((1, 1), (1, 1), (0, 0)), mode="edge")
-    shifts = [wide[y : y + shape[0], x : x + shape[1]] for y in range(3) for x in range(3)]
-    is_clear = np.all([(other == met_by_pixel).all(axis=-1) for other in shifts], axis=0)
-    return Seen(radiance.reshape(*shape, 3), is_clear)
+    return Seen(radiance.reshape(*shape, 3), ~near_edge(met_by_pixel))

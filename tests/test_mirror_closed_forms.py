@@ -39,14 +39,6 @@ def series(radiance: float, reflectance: np.ndarray | float, reflections: int, b
     return radiance * weights[:, :-1].sum(axis=1) + beyond * weights[:, -1]
 
 
-def held(image: np.ndarray, expected: np.ndarray | float, tolerance: float, what: str) -> None:
-    """Every pixel has this radiance."""
-    error = np.abs(image / np.broadcast_to(expected, image.shape) - 1.0).max(axis=-1)
-    wrong = ~(error <= tolerance)
-    count = int(wrong.sum())
-    assert count == 0, f"{what}: {count} of {wrong.size} pixels wrong, worst {np.nanmax(error):.2g} > {tolerance}"
-
-
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("bounces", range(1, 21))
 def test_parallel_mirrors_give_the_sum_of_their_reflectances(method: str, bounces: int) -> None:
@@ -69,7 +61,7 @@ def test_parallel_mirrors_give_the_sum_of_their_reflectances(method: str, bounce
         throughput *= REFLECTANCES[k % 2]
     expected += throughput * far
     image = ldtrefl.render(scene, method, max_bounces=bounces).image
-    held(image, expected, ROUNDING, f"{method}, {bounces} bounces")
+    np.testing.assert_allclose(image, np.broadcast_to(expected, image.shape), rtol=ROUNDING)
 
 
 SHAPES: dict[str, dict[str, object]] = {
@@ -101,7 +93,7 @@ def test_a_mirror_in_uniform_light_is_not_seen(method: str, shape: str, reflecta
     )
     frame = ldtrefl.render(scene, method, max_bounces=8)
     assert frame.reflector_mask.mean() > 0.1
-    held(frame.image, LIGHT, ROUNDING, f"{method}, {shape}")
+    np.testing.assert_allclose(frame.image, LIGHT, rtol=ROUNDING)
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -115,7 +107,7 @@ def test_a_mirror_in_a_glowing_room_shows_the_room(method: str, shape: str) -> N
         lighting=Lighting(ambient=(0, 0, 0)),
         objects=(Object(**SHAPES[shape], material=glowing_mirror(1.0, 0.0)), room),
     )
-    held(ldtrefl.render(scene, method, max_bounces=64).image, LIGHT, ROUNDING, f"{method}, {shape}")
+    np.testing.assert_allclose(ldtrefl.render(scene, method, max_bounces=64).image, LIGHT, rtol=ROUNDING)
 
 
 INSIDES = {
@@ -140,7 +132,8 @@ def test_inside_a_glowing_mirror_every_path_has_all_its_bounces(method: str, sha
         objects=(Object(**SHAPES[shape], material=glowing_mirror(0.8, 0.3)),),
     )
     image = ldtrefl.render(scene, method, max_bounces=bounces).image
-    held(image, series(0.3, 0.8, bounces, 5.0), ROUNDING, f"{method}, {shape}, {bounces} bounces")
+    expected = series(0.3, 0.8, bounces, 5.0)
+    np.testing.assert_allclose(image, np.broadcast_to(expected, image.shape), rtol=ROUNDING)
 
 
 def crowd(material: Material) -> tuple[Object, ...]:
@@ -167,4 +160,4 @@ def test_mirrors_never_give_more_than_falls_on_them(method: str, fresnel: bool, 
     assert np.isfinite(image).all() and image.min() >= 0.0
     assert image.max() <= LIGHT * (1.0 + ROUNDING), f"{method}: {image.max() / LIGHT - 1.0:.2g} too bright"
     if not fresnel:
-        held(image, LIGHT, ROUNDING, f"{method}, {bounces} bounces")
+        np.testing.assert_allclose(image, LIGHT, rtol=ROUNDING)

@@ -51,6 +51,24 @@ def test_a_deformed_object_gives_the_bits_of_a_new_renderer(method: str, options
     np.testing.assert_array_equal(renderer.scene.objects[1].geometry.vertices, bent(vertices, 2))
 
 
+@pytest.mark.parametrize(
+    ("method", "options"), [("ldt", {}), ("ldt", {"search": "linear"}), ("bvh", {}), ("envmap", {})], ids=str
+)
+def test_an_object_that_takes_the_shape_of_another_is_seen_in_it(method: str, options: dict) -> None:
+    """The scene's meshes stay the same then; which object has which does not."""
+    box = shapes.make("box")
+    box = ldtrefl.Mesh(box.vertices, box.faces)
+    tall = box.with_vertices(box.vertices * [1, 1, 3])
+    mirror = Object(name="mirror", mesh=box, scale=(8, 0.2, 6), translate=(0, 2, 0), material=Material(mirror=0.9))
+    others = [Object(name=name, mesh=mesh, translate=(x, 0, 0)) for name, mesh, x in (("a", tall, -2), ("b", box, 2))]
+    renderer = ldtrefl.Renderer(scene(objects=(mirror, *others)), method, **options)
+    before = renderer.render().reflection
+    renderer.update_vertices("b", tall.vertices)
+    frame = renderer.render()
+    np.testing.assert_array_equal(frame.image, ldtrefl.render(renderer.scene, method, **options).image)
+    assert (np.abs(frame.reflection - before).max(axis=2) > 0.01).sum() > 50
+
+
 def test_the_scene_with_the_deformed_mesh_is_what_is_shown() -> None:
     """The same vertices given at once, with device space as it was laid out by the first."""
     given = scene()
@@ -117,7 +135,10 @@ def test_nothing_of_earlier_frames_is_kept(cache: MapCache) -> None:
     given = scene()
     given = Scene(
         camera=given.camera,
-        objects=(*given.objects[:1], Object(name="knot", mesh=fine, scale=0.5, translate=(1.5, -1, 0))),
+        objects=(
+            Object(name="ball", shape="sphere", params={"segments": [60, 30]}, material=Material(mirror=0.9)),
+            Object(name="knot", mesh=fine, scale=0.5, translate=(1.5, -1, 0)),
+        ),
     )
     for method in ("ldt", "bvh"):
         renderer = ldtrefl.Renderer(given, method)

@@ -4,14 +4,19 @@ Everything is timed in turn in one process (A B A B ...), with compilation and a
 are medians, with the fastest and slowest beside them in the JSON. Threads are stated with every figure; what cannot be
 told to use one (embreex's builds) is kept to one core.
 
-    python tools/benchmark.py            # 25 minutes; writes tools/results/benchmark.json, .md and plots
+    python tools/benchmark.py            # 30 minutes; writes tools/results/benchmark.json, .md and plots
     python tools/benchmark.py --quick    # one minute, small meshes, for the shape of the output, on the screen
     python tools/benchmark.py --only rays,build --meshes "lucy.ply,knot 96 k" --kinds "primary;shadow"
                                          # a part of it: tables on the screen, files only where -o says
 
-Parts: rays, build, memory, frames (error against time, stages, error targets), threads, paper. Real meshes are taken
-from LDTREFL_MESH_PATH where they are; kinds of rays are described in ``benchmark_parts/rays.py``, names of meshes in
-``models.py``, rivals in ``rivals.py``, and what is right in ``truth.py``.
+    python tools/benchmark.py --only rival-frames --scenes "teapot;ball, knot 10 M"
+                                         # three seconds a scene and more; 10 M triangles are timed only if asked for
+    python tools/benchmark.py --before ../other            # our frames and starts in turn with another checkout's
+
+Parts: rays, build, memory, frames (error against time, stages, error targets), rival-frames (whole frames beside
+Mitsuba's), start (process to picture), threads, paper. Real meshes are taken from LDTREFL_MESH_PATH where they are;
+kinds of rays are described in ``benchmark_parts/rays.py``, names of meshes in ``models.py``, rivals in ``rivals.py``,
+what is right in ``truth.py``, and scenes of whole frames in ``frame_scenes.py``.
 """
 
 from __future__ import annotations
@@ -26,6 +31,7 @@ import warp as wp
 from benchmark_parts import cores
 from benchmark_parts.building import build_line, builds_of_mesh
 from benchmark_parts.common import ROOT
+from benchmark_parts.frame_scenes import FRAME_SCENES
 from benchmark_parts.frames import error_against_time, error_targets, frame_stages
 from benchmark_parts.memory import MEMORY_MESHES, memory_line, memory_of_mesh
 from benchmark_parts.models import OUTLIERS, every_name, model
@@ -34,7 +40,17 @@ from benchmark_parts.paper import paper_tables
 from benchmark_parts.rays import KINDS, RAYS
 from benchmark_parts.report import draw_plots, of_fastest, reading
 from benchmark_parts.result import Result
+from benchmark_parts.rival_frames import (
+    QUICK_SCENES,
+    QUICK_SIZE,
+    USUAL_SCENES,
+    frames_beside_before,
+    frames_beside_mitsuba,
+    frames_line,
+    mitsuba_note,
+)
 from benchmark_parts.rivals import RIVALS, available
+from benchmark_parts.starting import starts
 from benchmark_parts.threads import thread_scaling
 from benchmark_parts.tracing import Plan, rays_line, rays_on_mesh
 
@@ -44,7 +60,9 @@ from ldtrefl.files.atomic_write import written_whole
 
 TRACERS = (*OURS, *RIVALS)
 ALL_TRACERS = ", ".join(tracer.name for tracer in TRACERS)
-PARTS = ("rays", "build", "memory", "frames", "threads", "paper")
+PARTS = ("rays", "build", "memory", "frames", "rival-frames", "start", "threads", "paper")
+PARTS_BEFORE = ("rival-frames", "start")
+"""The parts that are measured beside another checkout."""
 QUICK_MESHES = ("knot 1 k", "knot 10 k", "knot 10 k outlier 1e3")
 QUICK_RAYS = 8000
 
@@ -83,9 +101,11 @@ def _arguments() -> argparse.Namespace:
 
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="small meshes, few rays and rounds")
-    parser.add_argument("--only", type=names, default=list(PARTS), help=f"parts, of {', '.join(PARTS)}")
+    parser.add_argument("--only", type=names, help=f"parts, of {', '.join(PARTS)}")
     parser.add_argument("--meshes", type=names, default=[], help="of rays and build, by name, with commas between")
     parser.add_argument("--kinds", type=kinds, default=[], help="of rays, with semicolons between")
+    parser.add_argument("--scenes", type=kinds, default=[], help="of rival-frames, with semicolons between")
+    parser.add_argument("--before", type=Path, help="folder of another checkout, to compare frames and starts with")
     parser.add_argument("--tracers", type=names, default=[t.name for t in TRACERS], help="default: " + ALL_TRACERS)
     parser.add_argument("--threads", type=int, nargs="+", help="numbers of them; default: 1, and all cores")
     parser.add_argument("--rounds", type=int, help="that count, of each timing")
@@ -93,15 +113,19 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--rays", type=int, help="of each kind, about")
     parser.add_argument("-o", "--output", type=Path, help="folder to write to; default of a full run: tools/results")
     arguments = parser.parse_args()
+    parts = PARTS if arguments.before is None else PARTS_BEFORE
+    arguments.only = arguments.only or list(parts)
     for what, given, allowed in (
-        ("part", arguments.only, PARTS),
+        ("part", arguments.only, parts),
         ("tracer", arguments.tracers, [tracer.name for tracer in TRACERS]),
         ("kind of rays", arguments.kinds, KINDS),
+        ("scene", arguments.scenes, FRAME_SCENES),
     ):
         for name in given:
             if name not in allowed:
                 parser.error(f"unknown {what} {name!r}, allowed are {'; '.join(allowed)}")
-    is_whole = list(arguments.only) == list(PARTS) and not (arguments.meshes or arguments.kinds or arguments.threads)
+    chosen = arguments.meshes or arguments.kinds or arguments.threads or arguments.scenes
+    is_whole = list(arguments.only) == list(PARTS) and not chosen
     is_whole = is_whole and len(arguments.tracers) == len(TRACERS) and not arguments.quick
     if arguments.output is None and is_whole:
         arguments.output = ROOT / "tools" / "results"
@@ -151,11 +175,33 @@ def measure(arguments: argparse.Namespace, result: Result) -> None:
             "stages": frame_stages(quick, frame_rounds),
             "error_targets": error_targets(quick, frame_rounds),
         }
+    if "rival-frames" in wanted:
+        _whole_frames(arguments, frame_rounds, result)
+    if "start" in wanted:
+        others = {} if arguments.before is None else {"before": arguments.before}
+        result["start"] = starts({"now": ROOT, **others}, frame_rounds, quick)
     if "threads" in wanted:
         result["scaling"] = thread_scaling(quick, frame_rounds)
     if "paper" in wanted:
         result["paper"] = paper_tables(quick, frame_rounds)
     ldtrefl.set_threads()
+
+
+def _whole_frames(arguments: argparse.Namespace, rounds: int, result: Result) -> None:
+    """Whole frames, scene by scene, beside another checkout's or Mitsuba's."""
+    size = QUICK_SIZE if arguments.quick else None
+    note = None if arguments.before else mitsuba_note()
+    if note:
+        result["notes"].append(note)
+        print(note, file=sys.stderr)
+    for name in arguments.scenes or (QUICK_SCENES if arguments.quick else USUAL_SCENES):
+        if arguments.before:
+            row = frames_beside_before(name, size, rounds, arguments.before)
+            result.setdefault("frames_before", []).append(row)
+        else:
+            row = frames_beside_mitsuba(name, size, rounds, with_mitsuba=note is None)
+            result.setdefault("rival_frames", []).append(row)
+        print(frames_line(row), flush=True)
 
 
 if __name__ == "__main__":

@@ -45,14 +45,11 @@ def errors_by_bounce(
         mask: (h, w) bool.
     """
     errors, same = [], mask
-    for number in range(1 + len(truth.later)):
-        if number > len(hits.later):
-            errors.append(BounceErrors(number + 1, 0, 0, 0, 0))
-            continue
-        found, true = (hits, truth) if number == 0 else (hits.later[number - 1], truth.later[number - 1])
+    for bounce, (found, true) in enumerate(zip((hits, *hits.later), (truth, *truth.later), strict=False), 1):
         compared = same & found.followed & true.followed
-        errors.append(_errors_of(number + 1, found, true, compared))
+        errors.append(_errors_of(bounce, found, true, compared))
         same = compared & _is_same_place(found, true, texel_sizes)
+    errors += [BounceErrors(bounce, 0, 0, 0, 0) for bounce in range(len(errors) + 1, len(truth.later) + 2)]
     return tuple(errors)
 
 

@@ -23,18 +23,19 @@
 struct Vectors {
 #if defined(PLAIN_VECTORS)
 #define EACH(expression) for (int i = 0; i < N; ++i) made.x[i] = expression
-#define VECTOR(Name, Flags, Count) \
+#define VECTOR(Name, Flags, Count, Float, Int) \
     struct Flags { \
         enum { N = Count }; \
-        int x[N]; \
+        Int x[N]; \
+        CUDA_CALLABLE Int operator[](int i) const { return x[i]; } \
         CUDA_CALLABLE Flags operator&(const Flags& b) const { Flags made; EACH(x[i] & b.x[i]); return made; } \
         CUDA_CALLABLE Flags operator|(const Flags& b) const { Flags made; EACH(x[i] | b.x[i]); return made; } \
     }; \
     struct Name { \
         enum { N = Count }; \
-        float x[N]; \
-        CUDA_CALLABLE float& operator[](int i) { return x[i]; } \
-        CUDA_CALLABLE float operator[](int i) const { return x[i]; } \
+        Float x[N]; \
+        CUDA_CALLABLE Float& operator[](int i) { return x[i]; } \
+        CUDA_CALLABLE Float operator[](int i) const { return x[i]; } \
         CUDA_CALLABLE Name operator-() const { Name made; EACH(-x[i]); return made; } \
         CUDA_CALLABLE Name operator+(const Name& b) const { Name made; EACH(x[i] + b.x[i]); return made; } \
         CUDA_CALLABLE Name operator-(const Name& b) const { Name made; EACH(x[i] - b.x[i]); return made; } \
@@ -53,11 +54,17 @@ struct Vectors {
     } \
     SHARED Name truncated(const Name& a) { \
         Name made; \
-        for (int i = 0; i < Count; ++i) made.x[i] = (float)(int)a.x[i]; \
+        for (int i = 0; i < Count; ++i) made.x[i] = (Float)(int)a.x[i]; \
         return made; \
     }
-    VECTOR(Four, FourFlags, 4)
-    VECTOR(Eight, EightFlags, 8)
+    VECTOR(Four, FourFlags, 4, float, int)
+    VECTOR(Eight, EightFlags, 8, float, int)
+#if defined(__CUDA_ARCH__)
+    VECTOR(One, OneFlags, 1, float, int)
+    VECTOR(OneDouble, OneDoubleFlags, 1, double, long long)
+#else
+    VECTOR(EightDouble, EightDoubleFlags, 8, double, long long)
+#endif
 #undef VECTOR
 #undef EACH
 #else
@@ -65,12 +72,61 @@ struct Vectors {
     typedef int FourFlags __attribute__((vector_size(16)));
     typedef float Eight __attribute__((vector_size(32)));
     typedef int EightFlags __attribute__((vector_size(32)));  // of each lane 0 or -1
+    typedef double EightDouble __attribute__((vector_size(64)));
+    typedef long long EightDoubleFlags __attribute__((vector_size(64)));
 
     SHARED Four chosen(FourFlags is, Four a, Four b) { return is ? a : b; }
     SHARED Eight chosen(EightFlags is, Eight a, Eight b) { return is ? a : b; }
+    SHARED EightDouble chosen(EightDoubleFlags is, EightDouble a, EightDouble b) { return is ? a : b; }
     SHARED Four truncated(Four a) { return __builtin_convertvector(__builtin_convertvector(a, FourFlags), Four); }
     SHARED Eight truncated(Eight a) { return __builtin_convertvector(__builtin_convertvector(a, EightFlags), Eight); }
 #endif
+
+    // As many lanes as a thread works on at once where all are alike.
+#if defined(__CUDA_ARCH__)
+    typedef One Wide;
+    typedef OneFlags WideFlags;
+    typedef OneDouble WideDouble;
+    enum { WIDE = 1 };
+#else
+    typedef Eight Wide;
+    typedef EightFlags WideFlags;
+    typedef EightDouble WideDouble;
+    enum { WIDE = 8 };
+#endif
+    SHARED Wide wide(float x) {
+        Wide made;
+        for (int i = 0; i < WIDE; ++i) made[i] = x;
+        return made;
+    }
+    SHARED WideDouble wide_double(double x) {
+        WideDouble made;
+        for (int i = 0; i < WIDE; ++i) made[i] = x;
+        return made;
+    }
+#if defined(PLAIN_VECTORS)
+    SHARED WideDouble doubled(const Wide& a) {
+        WideDouble made;
+        for (int i = 0; i < WIDE; ++i) made[i] = a[i];
+        return made;
+    }
+    SHARED Wide single(const WideDouble& a) {
+        Wide made;
+        for (int i = 0; i < WIDE; ++i) made[i] = (float)a[i];
+        return made;
+    }
+#else
+    SHARED WideDouble doubled(Wide a) { return __builtin_convertvector(a, WideDouble); }
+    SHARED Wide single(WideDouble a) { return __builtin_convertvector(a, Wide); }
+#endif
+    SHARED Wide root(Wide v) {
+#if !defined(PLAIN_VECTORS) && __has_builtin(__builtin_elementwise_sqrt)
+        return __builtin_elementwise_sqrt(v);
+#else
+        for (int i = 0; i < WIDE; ++i) v[i] = sqrtf(v[i]);
+        return v;
+#endif
+    }
 
     SHARED int as_int(float x) {
         int i;
@@ -87,6 +143,13 @@ struct Vectors {
         return __ffs(word) - 1;
 #else
         return __builtin_ctz(word);
+#endif
+    }
+    SHARED int lowest_bit(unsigned long long word) {
+#if defined(__CUDA_ARCH__)
+        return __ffsll((long long)word) - 1;
+#else
+        return __builtin_ctzll(word);
 #endif
     }
     // Whether at most two bits are set.

@@ -18,6 +18,7 @@ import warp as wp
 
 from ldtrefl.base import budget
 from ldtrefl.device import launch
+from ldtrefl.device.bits import lowest_bit
 from ldtrefl.device.stats import Stats
 from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.regions import Regions
@@ -27,7 +28,8 @@ from ldtrefl.frame.taken_rays import taken
 from ldtrefl.geometry.vectors import point_along
 from ldtrefl.shading.environment import environment_radiance
 from ldtrefl.shading.specular import mirror_direction
-from ldtrefl.shading.surface import Surface, extended_coordinates, may_return, surface_at
+from ldtrefl.shading.surface import Surface, extended_coordinates, may_return
+from ldtrefl.shading.surfaces import GROUP, Sighting, color_surface, look_along
 from ldtrefl.tracing.closest_hits import closest_hits_kernel
 from ldtrefl.tracing.nothing import no_shadows
 from ldtrefl.tracing.object_sets import ObjectSets
@@ -48,19 +50,71 @@ MOST_BOUNCES = "reflection.max_bounces"
 
 
 @wp.func
-def hit_surface(objects: wp.array(dtype=ObjectRecord), rays: RayBuffer, hits: HitBuffer, i: int) -> Surface:
-    """The surface that ray ``i`` has met."""
-    index, triangle, direction = hits.object[i], hits.triangle[i], rays.direction[i]
+def sight_hit(
+    objects: wp.array(dtype=ObjectRecord),
+    rays: RayBuffer,
+    hits: HitBuffer,
+    i: int,
+    sightings: wp.array(dtype=Sighting),
+    lane: int,
+):
+    """Let a lane of a group see what ray ``i`` has met."""
     uv = hits.barycentrics[i]
-    point = point_along(rays.origin[i], direction, hits.t[i])
-    stands_for_many = uv[0] < 0.0
-    if stands_for_many:
-        uv = extended_coordinates(objects[index], triangle, point)
-    surface = surface_at(objects, index, triangle, uv[0], uv[1], direction)
+    if uv[0] < 0.0:  # one triangle stands for many
+        point = point_along(rays.origin[i], rays.direction[i], hits.t[i])
+        uv = extended_coordinates(objects[hits.object[i]], hits.triangle[i], point)
+    sightings[lane].object = hits.object[i]
+    sightings[lane].triangle = hits.triangle[i]
+    sightings[lane].u = uv[0]
+    sightings[lane].v = uv[1]
+    sightings[lane].view = rays.direction[i]
+
+
+@wp.func
+def placed_on_ray(
+    objects: wp.array(dtype=ObjectRecord), rays: RayBuffer, hits: HitBuffer, i: int, on_triangle: wp.vec3d
+) -> wp.vec3d:
+    """Where ray ``i`` has met a surface: along the ray, or ``on_triangle`` where the ray is long."""
     # What a map answers lies a little off the triangle: such a point is shaded where it is.
-    if stands_for_many or not hits.t[i] > FARTHER * objects[index].radius:
-        surface.position = point
-    return surface
+    if hits.barycentrics[i][0] < 0.0 or not hits.t[i] > FARTHER * objects[hits.object[i]].radius:
+        return point_along(rays.origin[i], rays.direction[i], hits.t[i])
+    return on_triangle
+
+
+@wp.func
+def go_on(
+    objects: wp.array(dtype=ObjectRecord),
+    lighting: LightingRecord,
+    rays: RayBuffer,
+    i: int,
+    surface: Surface,
+    least_weight: float,
+    onwards_out: RayBuffer,
+) -> wp.vec3:
+    """Send ray ``i`` on from a mirror; or, if too little of what it brings would arrive, what the mirror reflects of
+    the environment."""
+    direction = mirror_direction(rays.direction[i], surface.normal, surface.facet)
+    onwards = wp.cw_mul(rays.throughput[i], surface.mirror)
+    if wp.max(onwards) < least_weight:
+        return wp.cw_mul(surface.mirror, environment_radiance(lighting, direction))
+    onwards_out.pixel[i] = rays.pixel[i]
+    onwards_out.origin[i] = surface.position
+    onwards_out.direction[i] = direction
+    onwards_out.throughput[i] = onwards
+    onwards_out.source[i] = surface.object
+    onwards_out.source_triangle[i] = surface.triangle
+    returns = may_return(objects[surface.object], surface)
+    onwards_out.may_return[i] = wp.where(returns, wp.uint8(1), wp.uint8(0))
+    return wp.vec3(0.0)
+
+
+@wp.func
+def add_brought(radiance: wp.array(dtype=wp.vec3), numbers: wp.array(dtype=wp.int32), i: int, brought: wp.vec3):
+    """Add what ray ``i`` brings; ``numbers`` are the rays' among the first bounce's, none if they are those."""
+    number = int(i)
+    if numbers.shape[0] > 0:
+        number = numbers[i]
+    radiance[number] = radiance[number] + brought
 
 
 @launch.once
@@ -72,6 +126,7 @@ def shade_hits_kernel(tracer: Tracer) -> wp.Kernel:
     def shade_hits(
         first: int,
         # In:
+        block: int,
         rays: RayBuffer,
         hits: HitBuffer,
         objects: wp.array(dtype=ObjectRecord),
@@ -85,36 +140,34 @@ def shade_hits_kernel(tracer: Tracer) -> wp.Kernel:
         # Out: the rays that go on, where a source is not -1
         onwards_out: RayBuffer,
     ):
-        """Shade what one ray has met."""
-        i = first + wp.tid()
-        onwards_out.source[i] = -1
-        if rays.source[i] < 0:
-            return
-        number = i
-        if numbers.shape[0] > 0:
-            number = numbers[i]
-        throughput = rays.throughput[i]
-        if hits.object[i] < 0:
-            brought = environment_radiance(lighting, rays.direction[i])
-            radiance[number] = radiance[number] + wp.cw_mul(throughput, brought)
-            return
-        surface = hit_surface(objects, rays, hits, i)
-        light = direct_radiance(views, objects, top, lighting, surface)
-        if wp.max(surface.mirror) > 0.0:
-            direction = mirror_direction(rays.direction[i], surface.normal, surface.facet)
-            onwards = wp.cw_mul(throughput, surface.mirror)
-            if wp.max(onwards) < least_weight:
-                light += wp.cw_mul(surface.mirror, environment_radiance(lighting, direction))
-            else:
-                onwards_out.pixel[i] = rays.pixel[i]
-                onwards_out.origin[i] = surface.position
-                onwards_out.direction[i] = direction
-                onwards_out.throughput[i] = onwards
-                onwards_out.source[i] = surface.object
-                onwards_out.source_triangle[i] = surface.triangle
-                returns = may_return(objects[surface.object], surface)
-                onwards_out.may_return[i] = wp.where(returns, wp.uint8(1), wp.uint8(0))
-        radiance[number] = radiance[number] + wp.cw_mul(throughput, light)
+        """Shade what a block of rays has met."""
+        sight_memory, surface_memory = wp.zeros(shape=GROUP, dtype=Sighting), wp.zeros(shape=GROUP, dtype=Surface)
+        sightings = wp.array(ptr=sight_memory.ptr, shape=(GROUP,), dtype=Sighting)
+        surfaces = wp.array(ptr=surface_memory.ptr, shape=(GROUP,), dtype=Surface)
+        begin = block * (first + wp.tid())
+        end = wp.min(begin + block, rays.source.shape[0])
+        while begin < end:
+            lanes = int(0)
+            for i in range(begin, wp.min(begin + GROUP, end)):
+                onwards_out.source[i] = -1
+                if rays.source[i] >= 0 and hits.object[i] >= 0:
+                    sight_hit(objects, rays, hits, i, sightings, i - begin)
+                    lanes = lanes | (1 << (i - begin))
+                elif rays.source[i] >= 0:
+                    brought = environment_radiance(lighting, rays.direction[i])
+                    add_brought(radiance, numbers, i, wp.cw_mul(rays.throughput[i], brought))
+            look_along(objects, lanes, sightings, surfaces)
+            while lanes != 0:
+                lane = lowest_bit(wp.uint64(lanes))
+                lanes = lanes & (lanes - 1)
+                i = begin + lane
+                color_surface(objects, sightings, lane, surfaces)
+                surfaces[lane].position = placed_on_ray(objects, rays, hits, i, surfaces[lane].position)
+                light = direct_radiance(views, objects, top, lighting, surfaces[lane])
+                if wp.max(surfaces[lane].mirror) > 0.0:
+                    light += go_on(objects, lighting, rays, i, surfaces[lane], least_weight, onwards_out)
+                add_brought(radiance, numbers, i, wp.cw_mul(rays.throughput[i], light))
+            begin += GROUP
 
     return shade_hits
 
@@ -261,8 +314,9 @@ class RayFollower:
             shadow, onwards = tracer if scene.lighting.shadows else no_shadows(device), empty_rays(count, device)
             places = wp.array(np.empty(0, np.int32) if numbers is None else numbers, dtype=wp.int32, device=device)
             weight = np.inf if is_last else self.limits.least_weight
-            inputs = [rays, hits, scene.records, scene.top_level, scene.lighting, shadow.views, places, weight]
-            launch.launch(shade_hits_kernel(shadow.tracer), count, [*inputs, radiance, onwards], device)
+            block = block_of(device)
+            inputs = [block, rays, hits, scene.records, scene.top_level, scene.lighting, shadow.views, places, weight]
+            launch.launch(shade_hits_kernel(shadow.tracer), -(-count // block), [*inputs, radiance, onwards], device)
         return hits, onwards
 
     def _needed(self, regions: Regions) -> set[int]:

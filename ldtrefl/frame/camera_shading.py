@@ -5,16 +5,21 @@ from dataclasses import dataclass
 import warp as wp
 
 from ldtrefl.device import launch
-from ldtrefl.frame.gbuffer import GBuffer, GBufferView, pixel_ray, pixel_surface, pixel_view
+from ldtrefl.device.bits import lowest_bit
+from ldtrefl.frame.backdrop import fill_backdrop
+from ldtrefl.frame.gbuffer import GBuffer, GBufferView, sight
 from ldtrefl.frame.shadows import direct_radiance_of
-from ldtrefl.shading.environment import environment_radiance
 from ldtrefl.shading.specular import mirror_direction
 from ldtrefl.shading.surface import Surface, may_return
+from ldtrefl.shading.surfaces import GROUP, Sighting, color_surface, look_from
 from ldtrefl.tracing.nothing import no_shadows
 from ldtrefl.tracing.ray_buffers import RayBuffer, empty_rays
-from ldtrefl.tracing.tracer import BoundTracer, Tracer
+from ldtrefl.tracing.tracer import BoundTracer, Tracer, block_of
 from ldtrefl.world.records import LightingRecord, ObjectRecord
 from ldtrefl.world.top_level import TopLevel
+
+PIXELS_IN_A_ROW = 256
+"""Pixels that one thread of a CPU shades in a row: what sees nothing is filled in together."""
 
 
 @launch.once
@@ -26,6 +31,7 @@ def shade_pixels_kernel(tracer: Tracer) -> wp.Kernel:
     def shade_pixels(
         first: int,
         # In:
+        block: int,
         gbuffer: GBufferView,
         objects: wp.array(dtype=ObjectRecord),
         top: TopLevel,
@@ -34,13 +40,30 @@ def shade_pixels_kernel(tracer: Tracer) -> wp.Kernel:
         # Out:
         radiance_out: wp.array(dtype=wp.vec3),
     ):
-        """Shade one pixel, unless it sees a reflector."""
-        i = first + wp.tid()
-        if gbuffer.object[i] < 0:
-            radiance_out[i] = environment_radiance(lighting, wp.normalize(pixel_ray(gbuffer, i)))
-        elif gbuffer.reflector[i] == wp.uint8(0):
-            surface = pixel_surface(gbuffer, objects, i, pixel_view(gbuffer, objects, i))
-            radiance_out[i] = direct_radiance(views, objects, top, lighting, surface)
+        """Shade a block of pixels, but for those that see a reflector."""
+        sight_memory, surface_memory = wp.zeros(shape=GROUP, dtype=Sighting), wp.zeros(shape=GROUP, dtype=Surface)
+        sightings = wp.array(ptr=sight_memory.ptr, shape=(GROUP,), dtype=Sighting)
+        surfaces = wp.array(ptr=surface_memory.ptr, shape=(GROUP,), dtype=Surface)
+        i = block * (first + wp.tid())
+        end = wp.min(i + block, radiance_out.shape[0])
+        while i < end:
+            begin = int(i)
+            while i < end and gbuffer.object[i] < 0:
+                i += 1
+            fill_backdrop(gbuffer.camera, lighting, begin, i, radiance_out)
+            begin = int(i)
+            lanes = int(0)
+            while i < wp.min(end, begin + GROUP) and gbuffer.object[i] >= 0:
+                if gbuffer.reflector[i] == wp.uint8(0):
+                    sight(gbuffer, i, sightings, i - begin)
+                    lanes = lanes | (1 << (i - begin))
+                i += 1
+            look_from(objects, lanes, gbuffer.camera.eye, sightings, surfaces)
+            while lanes != 0:
+                lane = lowest_bit(wp.uint64(lanes))
+                lanes = lanes & (lanes - 1)
+                color_surface(objects, sightings, lane, surfaces)
+                radiance_out[begin + lane] = direct_radiance(views, objects, top, lighting, surfaces[lane])
 
     return shade_pixels
 
@@ -66,6 +89,7 @@ def shade_reflectors_kernel(tracer: Tracer, starts_rays: bool) -> wp.Kernel:
     def shade_reflectors(
         first: int,
         # In:
+        block: int,
         pixels: wp.array(dtype=wp.int32),
         gbuffer: GBufferView,
         objects: wp.array(dtype=ObjectRecord),
@@ -77,16 +101,26 @@ def shade_reflectors_kernel(tracer: Tracer, starts_rays: bool) -> wp.Kernel:
         radiance_out: wp.array(dtype=wp.vec3),
         mirror_out: wp.array(dtype=wp.vec3),  # of each of the pixels
     ):
-        """Shade one pixel that sees a reflector."""
-        i = first + wp.tid()
-        pixel = pixels[i]
-        view = pixel_view(gbuffer, objects, pixel)
-        surface = pixel_surface(gbuffer, objects, pixel, view)
-        radiance_out[pixel] = direct_radiance(views, objects, top, lighting, surface)
-        mirror_out[i] = surface.mirror
-        if with_rays:
-            rays.pixel[i] = pixel
-            start_ray(rays, i, objects, surface, view.direction)
+        """Shade a block of pixels that see reflectors."""
+        sight_memory, surface_memory = wp.zeros(shape=GROUP, dtype=Sighting), wp.zeros(shape=GROUP, dtype=Surface)
+        sightings = wp.array(ptr=sight_memory.ptr, shape=(GROUP,), dtype=Sighting)
+        surfaces = wp.array(ptr=surface_memory.ptr, shape=(GROUP,), dtype=Surface)
+        begin = block * (first + wp.tid())
+        end = wp.min(begin + block, pixels.shape[0])
+        while begin < end:
+            count = wp.min(GROUP, end - begin)
+            for lane in range(count):
+                sight(gbuffer, pixels[begin + lane], sightings, lane)
+            look_from(objects, (1 << count) - 1, gbuffer.camera.eye, sightings, surfaces)
+            for lane in range(count):
+                color_surface(objects, sightings, lane, surfaces)
+                pixel = pixels[begin + lane]
+                radiance_out[pixel] = direct_radiance(views, objects, top, lighting, surfaces[lane])
+                mirror_out[begin + lane] = surfaces[lane].mirror
+                if with_rays:
+                    rays.pixel[begin + lane] = pixel
+                    start_ray(rays, begin + lane, objects, surfaces[lane], sightings[lane].view)
+            begin += count
 
     return shade_reflectors
 
@@ -110,8 +144,9 @@ def shade_gbuffer(
     scene, device = gbuffer.scene, gbuffer.scene.device
     if radiance is None or radiance.shape[0] != gbuffer.pixel_count:
         radiance = wp.empty(gbuffer.pixel_count, dtype=wp.vec3, device=device)
-    inputs = [gbuffer.view, scene.records, scene.top_level, scene.lighting, shadow.views]
-    launch.launch(shade_pixels_kernel(shadow.tracer), gbuffer.pixel_count, [*inputs, radiance], device)
+    block = PIXELS_IN_A_ROW if device.is_cpu else 1
+    inputs = [block, gbuffer.view, scene.records, scene.top_level, scene.lighting, shadow.views, radiance]
+    launch.launch(shade_pixels_kernel(shadow.tracer), -(-gbuffer.pixel_count // block), inputs, device)
     return _with_reflectors(gbuffer, shadow, radiance, starts_rays=starts_rays)
 
 
@@ -127,7 +162,7 @@ def _with_reflectors(gbuffer: GBuffer, shadow: BoundTracer, radiance: wp.array, 
     scene, device, pixels = gbuffer.scene, gbuffer.scene.device, gbuffer.reflector_pixels
     count = pixels.shape[0]
     mirror, rays = wp.empty(count, dtype=wp.vec3, device=device), empty_rays(count if starts_rays else 0, device)
-    inputs = [pixels, gbuffer.view, scene.records, scene.top_level, scene.lighting, shadow.views]
-    kernel = shade_reflectors_kernel(shadow.tracer, starts_rays)
-    launch.launch(kernel, count, [*inputs, rays, radiance, mirror], device)
+    block, kernel = block_of(device), shade_reflectors_kernel(shadow.tracer, starts_rays)
+    inputs = [block, pixels, gbuffer.view, scene.records, scene.top_level, scene.lighting, shadow.views]
+    launch.launch(kernel, -(-count // block), [*inputs, rays, radiance, mirror], device)
     return Shaded(radiance, mirror, rays)

@@ -8,6 +8,24 @@ import warp as wp
 from ldtrefl.device import launch
 from ldtrefl.frame.history import FrameParts
 
+PIXELS_TOGETHER = 4096
+"""Pixels that one thread of a CPU copies."""
+
+
+@launch.kernel
+def copy_pixels(
+    first: int,
+    # In:
+    block: int,
+    radiance: wp.array(dtype=wp.vec3),
+    # Out:
+    image_out: wp.array(dtype=wp.vec3),
+):
+    """Copy a block of pixels."""
+    begin = block * (first + wp.tid())
+    for i in range(begin, wp.min(begin + block, radiance.shape[0])):
+        image_out[i] = radiance[i]
+
 
 @launch.kernel
 def add_reflection(
@@ -28,9 +46,12 @@ def add_reflection(
 def composed(parts: FrameParts) -> np.ndarray:
     """(h, w, 3) float32 radiance of a frame, or a band of one."""
     gbuffer, shaded = parts.gbuffer, parts.shaded
-    image, pixels = wp.clone(shaded.radiance), gbuffer.reflector_pixels
+    device, pixels = gbuffer.scene.device, gbuffer.reflector_pixels
+    # By all threads: memory that is new to the process is slow to write.
+    image, block = wp.empty_like(shaded.radiance), PIXELS_TOGETHER if device.is_cpu else 1
+    launch.launch(copy_pixels, -(-image.shape[0] // block), [block, shaded.radiance, image], device)
     inputs = [pixels, shaded.mirror, parts.reflected.radiance, image]
-    launch.launch(add_reflection, pixels.shape[0], inputs, gbuffer.scene.device)
+    launch.launch(add_reflection, pixels.shape[0], inputs, device)
     picture: np.ndarray = image.numpy().reshape(*gbuffer.shape, 3)
     return picture
 

@@ -8,7 +8,7 @@ import warp as wp
 from ldtrefl.device import build_ahead, launch
 from ldtrefl.frame.bounces import shade_hits_kernel
 from ldtrefl.frame.camera_shading import shade_pixels_kernel, shade_reflectors_kernel
-from ldtrefl.frame.composite import add_reflection
+from ldtrefl.frame.composite import add_reflection, copy_pixels
 from ldtrefl.frame.large_triangles import draw_large_triangles
 from ldtrefl.frame.projection import project_vertices
 from ldtrefl.frame.skip_options import SkipOptions
@@ -19,7 +19,7 @@ from ldtrefl.tracing.nothing import NOTHING
 from ldtrefl.tracing.tracer import Tracer, block_of
 from ldtrefl.world.device_scene import DeviceScene
 
-OF_EVERY_SCENE = (draw_large_triangles, draw_triangles, resolve_pixels, project_vertices, add_reflection)
+OF_EVERY_SCENE = (draw_large_triangles, draw_triangles, resolve_pixels, project_vertices, add_reflection, copy_pixels)
 """What draws the G-buffer and composes the image."""
 
 

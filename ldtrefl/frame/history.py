@@ -19,6 +19,7 @@ from ldtrefl.frame.camera_shading import Shaded
 from ldtrefl.frame.drawn_objects import DrawnObjects
 from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.reflected_light import ReflectedLight
+from ldtrefl.frame.searched_pixels import CameraSearch, numbers_of
 from ldtrefl.frame.visibility import draw_gbuffer, resolved
 from ldtrefl.frame.zbuffer import CornerRoom, Drawing
 from ldtrefl.scene.description import Camera
@@ -57,6 +58,8 @@ class _Still:
     drawing: Drawing
     moving: frozenset[int]
     """The objects that are not in it."""
+    searched: frozenset[int]
+    """Of those that are, which the camera's rays were searched for in."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,25 +109,32 @@ class FrameHistory:
             return None
         return Reusable(self._reflected, moved)
 
-    def gbuffer(self, scene: DeviceScene, camera: Camera) -> GBuffer:
-        """Draw what ``camera`` sees of a scene. The last frame is dropped first, so that its memory is used again."""
+    def gbuffer(self, scene: DeviceScene, camera: Camera, search: CameraSearch | None) -> GBuffer:
+        """Draw what ``camera`` sees of a scene, or search for it where ``search`` does.
+
+        The last frame is dropped first, so that its memory is used again.
+        """
         moved = self._moved(scene, camera)
         if self._parts is not None:
             self._spare_radiance = self._parts.shaded.radiance
         self._parts = None
         if moved is None or len(moved) == len(scene.objects):
             self._still = None
-            return draw_gbuffer(scene, camera)
+            return draw_gbuffer(scene, camera, search)
         still = self._still
-        moved_since_drawn = None if still is None else still.view.moved(scene, camera)
-        if still is None or moved_since_drawn is None or not moved_since_drawn <= still.moving:
-            drawing = Drawing(camera, whole_image(camera), CornerRoom.of(scene))
-            stand = np.delete(np.arange(len(scene.objects)), list(moved))
-            drawing.draw(scene, DrawnObjects.of(scene, camera, stand))
-            still = self._still = _Still(_View(scene, camera), drawing, moved)
+        if still is None or not self._holds(still, scene, camera, search):
+            still = self._still = _drawn_still(scene, camera, moved, search)
         drawing = still.drawing.over()
-        drawing.draw(scene, DrawnObjects.of(scene, camera, np.array(sorted(still.moving))))
+        drawing.draw(scene, DrawnObjects.of(scene, camera, np.array(sorted(still.moving))), search)
         return resolved(drawing, scene)
+
+    @staticmethod
+    def _holds(still: _Still, scene: DeviceScene, camera: Camera, search: CameraSearch | None) -> bool:
+        """Whether what was drawn still stands as it stood, and is drawn and searched as it would be now."""
+        moved = still.view.moved(scene, camera)
+        if moved is None or not moved <= still.moving:
+            return False
+        return still.searched == frozenset(numbers_of(search).tolist()) - still.moving
 
     def take_spare_radiance(self) -> wp.array | None:
         """An array for the radiance of a frame's pixels, if there is one of an earlier frame that nobody reads."""
@@ -150,3 +160,12 @@ class FrameHistory:
         if not self._keeps or self._view is None:
             return None
         return self._view.moved(scene, camera)
+
+
+def _drawn_still(scene: DeviceScene, camera: Camera, moving: frozenset[int], search: CameraSearch | None) -> _Still:
+    """Draw all objects that stand still. There is room for the corners of the others: any of them may be drawn."""
+    stand = np.delete(np.arange(len(scene.objects)), list(moving))
+    searched = frozenset(numbers_of(search).tolist()) - moving
+    drawing = Drawing(camera, whole_image(camera), CornerRoom.of(scene, np.array(sorted(searched), np.int64)))
+    drawing.draw(scene, DrawnObjects.of(scene, camera, stand), search)
+    return _Still(_View(scene, camera), drawing, moving, searched)

@@ -12,6 +12,7 @@ import numpy as np
 import warp as wp
 
 from ldtrefl.device import launch
+from ldtrefl.device.bits import lowest_bit
 from ldtrefl.device.native_sources import native_body
 from ldtrefl.frame.drawn_objects import DrawnObjects
 from ldtrefl.frame.large_triangles import LargeTriangles, draw_or_set_aside, draw_those_set_aside, none_set_aside
@@ -19,7 +20,6 @@ from ldtrefl.frame.projection import DrawnObject, projected
 from ldtrefl.frame.triangle_rows import Target, Triangle
 from ldtrefl.geometry.vectors import as_double, as_single
 from ldtrefl.scene.description import Camera
-from ldtrefl.tracing.object_sets import lowest_bit
 from ldtrefl.tracing.tracer import array_of_views
 from ldtrefl.world.clusters import CLUSTER, LANES, Clusters
 from ldtrefl.world.device_scene import DeviceScene
@@ -205,7 +205,7 @@ def draw_instances(
     while cluster >= 0:
         seen = triangles_seen(mesh, view, target, cluster)
         while seen != 0:
-            k = lowest_bit(wp.uint32(seen))
+            k = lowest_bit(wp.uint64(seen))
             seen = seen & (seen - 1)
             index = mesh.triangles[CLUSTER * cluster + k]
             triangle = Triangle()

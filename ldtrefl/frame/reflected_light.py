@@ -24,3 +24,5 @@ class ReflectedLight:
     """Those rays, if the next frame may use them again."""
     resolutions: Mapping[DeviceMesh, int] = field(default_factory=dict)
     """By mesh, the resolution of the maps that the rays were searched for in. It must be the same to use them again."""
+    searched_by_camera: frozenset[DeviceMesh] = frozenset()
+    """The meshes that were searched triangle by triangle because the camera's rays were; the same holds of them."""

@@ -18,6 +18,7 @@ import numpy as np
 import warp as wp
 
 from ldtrefl.device import launch
+from ldtrefl.device.bits import lowest_bit
 from ldtrefl.device.stats import Stats
 from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.run_lists import RunLists, listed, set_entry, swap_entries
@@ -25,14 +26,14 @@ from ldtrefl.frame.run_rays import ROWS, lay_side_by_side, rays_near
 from ldtrefl.geometry.sphere import sphere_entry
 from ldtrefl.geometry.vectors import from_to
 from ldtrefl.tracing.closest_hits import GROUP
-from ldtrefl.tracing.object_sets import RUN, ObjectSets, all_sets, lowest_bit_of_64, run_count
+from ldtrefl.tracing.object_sets import RUN, ObjectSets, all_sets, run_count
 from ldtrefl.tracing.ray_buffers import RayBuffer
 from ldtrefl.world.device_scene import DeviceScene
 from ldtrefl.world.top_level import STACK, TopLevel
 
 FEW_OBJECTS = 8
-"""Up to this many objects culling costs as much as it saves: 4% more time than without it
-with two to five objects, 11% less with fifty."""
+"""Up to this many objects culling costs as much as it saves: 4% more time than without it with two to five objects, 11%
+less with fifty."""
 
 COSINE_SLACK = wp.constant(1.0e-5)
 """Cosines are lowered by this, which widens cones: a hundred roundings of a float32 dot product."""
@@ -94,7 +95,7 @@ def without_own(rays: RayBuffer, begin: int, met: wp.uint64, k: int) -> wp.uint6
     others = met
     left = met
     while left != wp.uint64(0):
-        bit = lowest_bit_of_64(left)
+        bit = lowest_bit(left)
         left = left & (left - wp.uint64(1))
         if rays.source[begin + bit] == k and rays.may_return[begin + bit] == wp.uint8(0):
             others = others & ~(wp.uint64(1) << wp.uint64(bit))
@@ -169,7 +170,7 @@ def cull_runs(
                 elif met != wp.uint64(0):
                     shown_out[child.first] = wp.uint8(1)
                     if found < room:
-                        i = begin + lowest_bit_of_64(met)
+                        i = begin + lowest_bit(met)
                         entry = sphere_entry(rays.origin[i], rays.direction[i], child.centre, child.radius)
                         set_entry(lists, lists.start[run] + found, child.first, met, entry)
                     found += 1

@@ -15,7 +15,7 @@ from ldtrefl.tracing.nothing import NOTHING
 from ldtrefl.tracing.tracer import Query, Tracer
 from ldtrefl.world.records import ObjectRecord
 from ldtrefl.world.top_level import STACK, TopLevel
-from ldtrefl.world.unit_rays import into_unit, start_above, start_above_own, unit_normal
+from ldtrefl.world.unit_rays import facet_towards, into_unit, start_above, start_above_own, unit_normal
 
 
 @wp.struct
@@ -37,7 +37,8 @@ def shadow_ray(record: ObjectRecord, surface: Surface, towards: wp.vec3, distanc
     shadow.query.direction = ray.direction
     shadow.query.t_max = distance * ray.stretch
     if is_own:
-        shadow.query.origin = start_above_own(record, surface.triangle, ray.origin, outwards)
+        normal = facet_towards(record, surface.triangle, outwards)
+        shadow.query.origin = start_above_own(record, surface.triangle, ray.origin, normal)
         shadow.outwards = outwards
         if record.smooth != 0 and wp.dot(ray.direction, outwards) < 0.0:
             shadow.rise = rise_to_smooth(record, surface.triangle, shadow.query.origin, outwards)

@@ -1,7 +1,8 @@
 """Primary visibility: which point of which triangle each pixel sees.
 
-It is found by a z-buffer (``zbuffer.py``). To cast rays instead would need a BVH, whose build alone costs more than
-drawing once; ``tools/gbuffer_choice.py`` measures both. A large image is made in bands.
+It is found by a z-buffer (``zbuffer.py``). Triangles are drawn into it; in meshes whose triangles are many and small a
+method may have the pixels' rays searched for instead (``search_choice.py``), if it needs a tree over them anyway: to
+build one costs more than to draw once. ``tools/gbuffer_choice.py`` measures both. A large image is made in bands.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from ldtrefl.frame.gbuffer import GBuffer, GBufferView
 from ldtrefl.frame.pixel_box import BEHIND
 from ldtrefl.frame.pixel_order import BLOCK
 from ldtrefl.frame.projection import DrawnObject, corner_of, homogeneous
+from ldtrefl.frame.searched_pixels import CameraSearch, numbers_of
 from ldtrefl.frame.zbuffer import CornerRoom, Drawing
 from ldtrefl.geometry.perspective_raster import (
     HomogeneousTriangle,
@@ -28,14 +30,14 @@ from ldtrefl.scene.description import Camera
 from ldtrefl.world.camera import Band, camera_view, whole_image
 from ldtrefl.world.device_scene import DeviceScene
 from ldtrefl.world.records import ObjectRecord
-from ldtrefl.world.triangle_numbers import TriangleNumbers, first_triangle_of, object_of
+from ldtrefl.world.triangle_numbers import TriangleNumbers, first_triangle_of, has_number, object_of
 
 BAND_PIXELS = 1 << 20
 """Pixels of a band, about: enough rays for all threads, and their arrays take less than 0.2 GB."""
 
 
-PIXELS_IN_A_ROW = 16
-"""Pixels that one thread of a CPU finds: neighbours often see the same triangle, which is then projected once."""
+PIXELS_IN_A_ROW = 64
+"""Pixels that one thread of a CPU finds: neighbours often see the same object."""
 
 
 @wp.func
@@ -105,41 +107,28 @@ def resolve_pixels(
     # Out, the reflectors 0 before:
     seen: GBufferView,
 ):
-    """Find which point of which triangle each pixel of a run sees, from its key."""
-    begin = run * (first + wp.tid())
-    end = wp.min(begin + run, keys.shape[0])
-    i = int(begin)
+    """Find which triangle each pixel of a run sees, from its key."""
+    i = run * (first + wp.tid())
+    end = wp.min(i + run, keys.shape[0])
+    index = int(-1)
+    is_mirror = wp.uint8(0)
     while i < end:
-        if keys[i] == wp.int64(0):
+        key = keys[i]
+        if key == wp.int64(0):
             seen.object[i] = -1
-            seen.triangle[i] = -1
-            seen.barycentrics[i] = wp.vec2(0.0, 0.0)
-            i += 1
         else:
-            number = number_in(keys[i])
-            index = object_of(numbers, number)
-            one = drawn[place_of[index]]
+            number = number_in(key)
+            if not has_number(numbers, index, number):
+                index = object_of(numbers, number)
+                is_mirror = wp.where(wp.max(objects[index].mirror) > 0.0, wp.uint8(1), wp.uint8(0))
             triangle = first_triangle_of(numbers, index, number)
             if numbers.shift > 0:
-                pixel = pixel_of(i, width, first_row)
-                triangle = of_its_group(one, objects, corners, triangle, 1 << numbers.shift, pixel, keys[i])
-            tri = triangle_seen(one, objects, corners, triangle)
-            is_mirror = wp.where(wp.max(objects[index].mirror) > 0.0, wp.uint8(1), wp.uint8(0))
-
-            # Pixels in a row often see the same triangle.
-            more = bool(True)
-            while more:
-                pixel = pixel_of(i, width, first_row)
-                at = perspective_weights(tri, pixel[0], pixel[1])
-                total = at[0] + at[1] + at[2]
-                seen.object[i] = index
-                seen.triangle[i] = triangle
-                seen.barycentrics[i] = wp.vec2(float(at[1] / total), float(at[2] / total))
-                seen.reflector[i] = is_mirror
-                i += 1
-                more = i < end and numbers.shift == 0
-                if more:
-                    more = number_in(keys[i]) == number and keys[i] != wp.int64(0)
+                one, pixel = drawn[place_of[index]], pixel_of(i, width, first_row)
+                triangle = of_its_group(one, objects, corners, triangle, 1 << numbers.shift, pixel, key)
+            seen.object[i] = index
+            seen.triangle[i] = triangle
+            seen.reflector[i] = is_mirror
+        i += 1
 
 
 def resolved(drawing: Drawing, scene: DeviceScene) -> GBuffer:
@@ -147,7 +136,6 @@ def resolved(drawing: Drawing, scene: DeviceScene) -> GBuffer:
     device, camera, pixels = scene.device, drawing.camera, drawing.keys.shape[0]
     view = GBufferView()
     view.object, view.triangle = (wp.empty(pixels, dtype=wp.int32, device=device) for _ in range(2))
-    view.barycentrics = wp.empty(pixels, dtype=wp.vec2, device=device)
     view.reflector = wp.zeros(pixels, dtype=wp.uint8, device=device)
     view.camera = camera_view(camera, scene.device_from_world, drawing.band)
     objects = DrawnObjects.joined([part.objects for part in drawing.drawn])
@@ -164,21 +152,23 @@ def resolved(drawing: Drawing, scene: DeviceScene) -> GBuffer:
     return GBuffer(scene, camera, view, drawing.band)
 
 
-def draw_gbuffer(scene: DeviceScene, camera: Camera) -> GBuffer:
-    """Draw what ``camera`` sees of the scene."""
-    drawing = Drawing(camera, whole_image(camera), CornerRoom.of(scene))
-    drawing.draw(scene, DrawnObjects.of(scene, camera, np.arange(len(scene.objects))))
+def draw_gbuffer(scene: DeviceScene, camera: Camera, search: CameraSearch | None = None) -> GBuffer:
+    """Draw what ``camera`` sees of the scene; its rays are searched for in those objects that ``search`` has."""
+    drawing = Drawing(camera, whole_image(camera), CornerRoom.of(scene, numbers_of(search)))
+    drawing.draw(scene, DrawnObjects.of(scene, camera, np.arange(len(scene.objects))), search)
     return resolved(drawing, scene)
 
 
-def draw_in_bands(scene: DeviceScene, camera: Camera, *, without: int = -1) -> Iterator[GBuffer]:
-    """Draw what ``camera`` sees of the scene, band by band from the top; object number ``without`` is left out."""
+def draw_in_bands(
+    scene: DeviceScene, camera: Camera, search: CameraSearch | None = None, *, without: int = -1
+) -> Iterator[GBuffer]:
+    """The same, band by band from the top; object number ``without`` is left out."""
     everything = np.arange(len(scene.objects))
     objects = DrawnObjects.of(scene, camera, everything[everything != without])
     rows = max(1, BAND_PIXELS // camera.width // BLOCK) * BLOCK
-    room = CornerRoom.of(scene)
+    room = CornerRoom.of(scene, numbers_of(search))
     for row in range(0, camera.height, rows):
         drawing = Drawing(camera, Band(row, min(rows, camera.height - row)), room)
         # Corners are the whole image's: those that are kept are found once.
-        drawing.draw(scene, objects, are_projected=row > 0 and room.keeps)
+        drawing.draw(scene, objects, search, are_projected=row > 0 and room.keeps)
         yield resolved(drawing, scene)

@@ -2,7 +2,9 @@
 
 Objects are drawn together by the same three launches, however many there are: their vertices and triangles are handed
 out in chunks. As many are drawn together as there is room for their corners. Objects of which many have the same mesh
-are drawn by ``instances.py``. The triangles are those of ``geometry/perspective_raster.py``.
+are drawn by ``instances.py``. The triangles are those of ``geometry/perspective_raster.py``. Of some objects the
+triangles are not drawn at all: pixels' rays are searched for in them, after all others are drawn
+(``searched_pixels.py``).
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ from ldtrefl.frame.drawn_objects import DrawnObjects
 from ldtrefl.frame.instances import draw_all_instances, instances_among
 from ldtrefl.frame.large_triangles import LargeTriangles, draw_or_set_aside, draw_those_set_aside, none_set_aside
 from ldtrefl.frame.projection import DrawnObject, chunks_of, project_vertices
+from ldtrefl.frame.searched_pixels import CameraSearch, numbers_of, search_pixels
 from ldtrefl.frame.triangle_rows import Target, Triangle
 from ldtrefl.scene.description import Camera
 from ldtrefl.world.camera import Band
@@ -73,21 +76,21 @@ class CornerRoom:
     corners: wp.array
     """(m,) vec3d: all objects' if they are kept, else none."""
     first: np.ndarray
-    """(objects,) int64, the place of each object's vertex 0; -1 if corners are not kept."""
+    """(objects,) int64, the place of each object's vertex 0; -1 if its corners are not kept."""
+    keeps: bool
+    """Whether the corners of what is drawn are kept."""
 
     @classmethod
-    def of(cls, scene: DeviceScene) -> CornerRoom:
-        """Room for all corners of a scene, or none if there are too many to be kept."""
-        total = int(scene.vertex_counts.sum())
-        first = np.cumsum(scene.vertex_counts) - scene.vertex_counts
-        if total > CORNERS_KEPT:
+    def of(cls, scene: DeviceScene, without: np.ndarray) -> CornerRoom:
+        """Room for all corners of a scene's objects but those of these numbers, or none if they are too many."""
+        counts = scene.vertex_counts.copy()
+        counts[without] = 0
+        total, first = int(counts.sum()), np.cumsum(counts) - counts
+        first[without] = -1
+        keeps = total <= CORNERS_KEPT
+        if not keeps:
             total, first = 0, np.full_like(first, -1)
-        return cls(wp.empty(total, dtype=wp.vec3d, device=scene.device), first)
-
-    @property
-    def keeps(self) -> bool:
-        """Whether corners are kept."""
-        return len(self.first) == 0 or self.first[0] >= 0
+        return cls(wp.empty(total, dtype=wp.vec3d, device=scene.device), first, keeps)
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,14 +108,14 @@ class Drawing:
     """A z-buffer of a band of an image, and what was drawn in it."""
 
     def __init__(self, camera: Camera, band: Band, room: CornerRoom) -> None:
-        """Empty: nothing is seen."""
+        """Empty: nothing is seen. There is room for the corners of all that will be drawn."""
         self.camera = camera
         self.band = band
         self.room = room
         self.keys = wp.zeros(camera.width * band.rows, dtype=wp.int64, device=room.corners.device)
         """(h * w,) int64: nearness of what a pixel sees, then its triangle's number; 0 where nothing is seen."""
         self.drawn: list[DrawnPart] = []
-        """What was drawn."""
+        """What was drawn or searched."""
 
     def over(self) -> Drawing:
         """A copy to draw other objects over."""
@@ -121,8 +124,25 @@ class Drawing:
         copy.keys, copy.drawn = wp.clone(self.keys), list(self.drawn)
         return copy
 
-    def draw(self, scene: DeviceScene, objects: DrawnObjects, *, are_projected: bool = False) -> None:
-        """Draw objects; ``are_projected`` says that corners that are kept are in the room already."""
+    def draw(
+        self,
+        scene: DeviceScene,
+        objects: DrawnObjects,
+        search: CameraSearch | None = None,
+        *,
+        are_projected: bool = False,
+    ) -> None:
+        """Draw objects, and search in those that ``search`` has; ``are_projected`` says that corners that are kept are
+        in the room already."""
+        are_searched = np.isin(objects.numbers, numbers_of(search))
+        self._draw_all(scene, objects.some(~are_searched), are_projected=are_projected)
+        if search is not None and are_searched.any():
+            searched = objects.some(are_searched)
+            self.drawn.append(DrawnPart(searched, np.full(len(searched.numbers), -1), None))
+            search_pixels(scene, self.camera, self.band, searched, search.tracer, self._target())
+
+    def _draw_all(self, scene: DeviceScene, objects: DrawnObjects, *, are_projected: bool) -> None:
+        """Draw objects, as instances or apart."""
         are_instances = instances_among(scene, self.camera, objects)
         if not are_instances.any():
             self._draw_apart(scene, objects, are_projected=are_projected)

@@ -1,4 +1,6 @@
-"""Barycentrics of a triangle (a, b, c): the weights (u, v) of b and c at a point; a has the rest, 1 - u - v."""
+"""The normal of a triangle (a, b, c), and its barycentrics: the weights (u, v) of b and c at a point; a has the rest,
+1 - u - v.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +8,13 @@ import warp as wp
 
 ONE_THIRD = wp.constant(1.0 / 3.0)
 """Both barycentrics of a triangle's centroid."""
+
+
+@wp.func
+def facet_normal(a: wp.vec3d, b: wp.vec3d, c: wp.vec3d) -> wp.vec3d:
+    """The unit normal by the winding, 0 for a triangle without area. In float64: of a slim triangle's cross product
+    float32 leaves little."""
+    return wp.normalize(wp.cross(b - a, c - a))
 
 
 @wp.func

@@ -3,8 +3,8 @@
 Maps are kept by mesh and resolution. A frame uses exactly the resolutions that are chosen for it, whatever is kept, so
 that it has the bits of a first frame.
 
-A mirror is searched for triangle by triangle: rays start on its own triangles, and what a patch is off by, every
-further bounce makes larger.
+A mirror is searched triangle by triangle: rays start on its own triangles, and what a patch is off by, every further
+bounce makes larger. So is a mesh that the camera's rays are searched for in: one tree serves them and the reflections.
 """
 
 from __future__ import annotations
@@ -58,6 +58,8 @@ class _Bound:
 
     maps: dict[DeviceMesh, LayeredDepthTexture | None]
     """The maps of each mesh; None where none are needed."""
+    mesh_of: np.ndarray
+    """The scene's: which object has which mesh."""
     tracer: BoundTracer
 
 
@@ -68,6 +70,8 @@ class SceneMaps:
         self.options = options
         self.chosen: Mapping[DeviceMesh, int] = {}
         """Resolutions for the rays to come; a mesh that is not in it has the usual one."""
+        self.searched_by_camera: frozenset[DeviceMesh] = frozenset()
+        """The meshes that the frame's camera rays are searched for in."""
         self._maps: dict[MapKey, LayeredDepthTexture] = {}
         """Those used last at the end."""
         self._bound: _Bound | None = None
@@ -79,10 +83,10 @@ class SceneMaps:
 
     def bound(self, scene: DeviceScene, objects: Collection[int], stats: Stats) -> BoundTracer:
         """The tracer, once the maps of these objects are peeled at the resolutions chosen."""
-        maps, mirrors = self._maps, _mirrors(scene)
+        maps, whole = self._maps, self._searched_whole(scene)
         with stats.stage("peel", scene.device):
             for mesh in _meshes_of(scene, objects):
-                key = self._key(mesh, mesh in mirrors)
+                key = self._key(mesh, mesh in whole)
                 if key not in maps:
                     maps[key] = self._peeled(key, stats)
                     if self.options.search == "linear":
@@ -92,15 +96,16 @@ class SceneMaps:
             meshes = set(scene.meshes)
             for key in [key for key in maps if key.mesh not in meshes]:
                 del maps[key]  # of a mesh that has been deformed since
-            current = {mesh: maps.get(self._key(mesh, mesh in mirrors)) for mesh in scene.meshes}
-            if self._bound is None or self._bound.maps != current:
-                self._bound = self._bind(scene, current)
-        return self._bound.tracer
+            current = {mesh: maps.get(self._key(mesh, mesh in whole)) for mesh in scene.meshes}
+            bound = self._bound
+            if bound is None or bound.mesh_of is not scene.mesh_of or bound.maps != current:
+                bound = self._bound = self._bind(scene, current)
+        return bound.tracer
 
     def has_usual_maps(self, scene: DeviceScene, objects: Collection[int]) -> bool:
         """Whether the maps of these objects are made, at the usual resolution."""
-        mirrors = _mirrors(scene)
-        return all(self._usual_key(mesh, mesh in mirrors) in self._maps for mesh in _meshes_of(scene, objects))
+        whole = self._searched_whole(scene)
+        return all(self._usual_key(mesh, mesh in whole) in self._maps for mesh in _meshes_of(scene, objects))
 
     def meshes_without_maps(self, scene: DeviceScene) -> int:
         """Meshes that nothing has been peeled of."""
@@ -114,13 +119,17 @@ class SceneMaps:
             if count[key.mesh] > RESOLUTIONS_KEPT:
                 del self._maps[key]
 
-    def _usual_key(self, mesh: DeviceMesh, is_mirror: bool) -> MapKey:
-        """The maps of a mesh for which nothing is chosen."""
-        return MapKey(mesh, self.usual, "exact" if is_mirror else self.options.quality, False)
+    def _searched_whole(self, scene: DeviceScene) -> set[DeviceMesh]:
+        """The meshes that are searched triangle by triangle, whatever the quality."""
+        return _mirrors(scene) | self.searched_by_camera
 
-    def _key(self, mesh: DeviceMesh, is_mirror: bool) -> MapKey:
+    def _usual_key(self, mesh: DeviceMesh, is_whole: bool) -> MapKey:
+        """The maps of a mesh for which nothing is chosen."""
+        return MapKey(mesh, self.usual, "exact" if is_whole else self.options.quality, False)
+
+    def _key(self, mesh: DeviceMesh, is_whole: bool) -> MapKey:
         """The maps of a mesh for the rays to come."""
-        usual = self._usual_key(mesh, is_mirror)
+        usual = self._usual_key(mesh, is_whole)
         resolution = self.chosen.get(mesh, self.usual)
         if self.options.search != "exact":
             return replace(usual, resolution=resolution)
@@ -146,7 +155,7 @@ class SceneMaps:
             for maps in current.values()
         ]
         views = array_of_shared_views(of_meshes, scene.mesh_of, tracer.view, scene.device)
-        return _Bound(current, BoundTracer(tracer, views, of_meshes))
+        return _Bound(current, scene.mesh_of, BoundTracer(tracer, views, of_meshes))
 
 
 def _warn_if_open(scene: DeviceScene, mesh: DeviceMesh) -> None:

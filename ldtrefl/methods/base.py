@@ -41,8 +41,9 @@ from ldtrefl.frame.bounces import BounceLimits
 from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.history import Reusable
 from ldtrefl.frame.reflected_light import ReflectedLight
+from ldtrefl.frame.searched_pixels import CameraSearch
 from ldtrefl.frame.skip_options import SkipChoice, skip_names, skip_options_of
-from ldtrefl.scene.description import Scene
+from ldtrefl.scene.description import Camera, Scene
 from ldtrefl.tracing.ray_buffers import RayBuffer
 from ldtrefl.tracing.scene_bvh import SceneBvh
 from ldtrefl.tracing.tracer import SceneTracer
@@ -111,6 +112,11 @@ class Method(abc.ABC):
     def first_kernels(self) -> list[wp.Kernel]:
         """Kernels that a first frame will need, those first that take longest to compile: they are compiled ahead."""
         return []
+
+    def camera_search(self, scene: DeviceScene, camera: Camera, stats: Stats) -> CameraSearch | None:
+        """The objects of ``scene`` that this frame's camera rays are to be searched for in, and by what; None to draw
+        all. It may depend on the scene and the camera alone. Called before anything else of a frame."""
+        return None
 
     def foresee(self, gbuffer: GBuffer, stats: Stats) -> None:  # noqa: B027  (most methods have nothing to foresee)
         """Make the tracer ready for what the camera sees. Called before shadow rays are asked of it, only if the scene

@@ -7,7 +7,8 @@ regions on the reflectors are culled (section 3.2); the remaining pixels' rays a
     ldtrefl render scene.toml --method ldt --set resolution=256
 
 The default search is our own (``ldt/exact/tree.py``): it goes down a tree over the triangles, or over the texels where
-many triangles share one. ``search=linear`` is the paper's.
+many triangles share one. ``search=linear`` is the paper's. In meshes whose triangles are many and small in the image
+the exact search answers the camera's rays, too (``frame/search_choice.py``).
 
 Fails: ``search=linear`` misses what is thinner than a step or a texel, and its silhouettes are as coarse as texels;
 ``quality=fast`` loses a little at silhouettes.
@@ -18,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Literal
 
+import numpy as np
 import warp as wp
 from pydantic import Field
 from pydantic.dataclasses import dataclass
@@ -41,6 +43,8 @@ from ldtrefl.frame.regions import (
     objects_that_rays_meet,
     safe_regions,
 )
+from ldtrefl.frame.search_choice import objects_to_search
+from ldtrefl.frame.searched_pixels import CameraSearch
 from ldtrefl.ldt.exact.build import KERNELS as TREE_KERNELS
 from ldtrefl.ldt.options import (
     BINARY_STEPS,
@@ -56,6 +60,7 @@ from ldtrefl.ldt.resolution import resolutions_for
 from ldtrefl.ldt.scene_maps import MapOptions, SceneMaps
 from ldtrefl.ldt.searches import TRACERS
 from ldtrefl.methods.base import CONFIG, CommonConfig, RayConfig, RayMethod
+from ldtrefl.scene.description import Camera
 from ldtrefl.tracing.ray_buffers import RayBuffer
 from ldtrefl.tracing.tracer import BoundTracer, SceneTracer
 from ldtrefl.world.device_mesh import DeviceMesh
@@ -74,11 +79,14 @@ class Ldt(RayMethod):
         resolution: Resolution | None = None
         """Texels along an object's longest side, 16 to 4096; 256 if neither this nor error is given."""
         error: Annotated[float, Field(gt=0.0, le=64.0)] | None = None
-        """Pixels that reflected points and shadows may be off by: resolutions are chosen for what is seen."""
+        """Pixels that reflected points and shadows may be off by: resolutions are chosen for what is seen. The camera's
+        own rays are then never searched for, and all triangles drawn."""
         search: Literal["exact", "linear"] = "exact"
-        """How a ray is searched for: exact (down a tree over the surface), linear (the paper's)."""
+        """How a ray is searched for: exact (down a tree over the surface; the camera's rays, too, in meshes whose
+        triangles are many and small in the image), linear (the paper's)."""
         quality: Quality = DEFAULT_QUALITY
-        """Of the exact search: exact (every triangle), balanced (texels where triangles are finer), fast (texels)."""
+        """Of the exact search: exact (every triangle), balanced (texels where triangles are finer), fast (texels).
+        Mirrors, and meshes that the camera's rays are searched for in, are always exact."""
         linear_steps: LinearSteps = TEXEL
         """Samples of the linear search through an object's box: texel (one for each texel passed), or 1 to 100,000."""
         binary_steps: BinarySteps = BINARY_STEPS
@@ -111,6 +119,17 @@ class Ldt(RayMethod):
         search, *others = kernels_of_rays(self.scene, TRACERS[self.config.search], self.skip)
         return [search, *(TREE_KERNELS if self.config.search == "exact" else ()), *others, cull_runs]
 
+    def camera_search(self, scene: DeviceScene, camera: Camera, stats: Stats) -> CameraSearch | None:
+        """Meshes whose triangles are many and small in the image are searched by the exact search, unless maps are to
+        be as coarse as an error allows."""
+        numbers = np.zeros(0, np.int64)
+        if self.config.search == "exact" and not self._chooses:
+            numbers = objects_to_search(scene, camera)
+        self.tracer.searched_by_camera = frozenset(scene.meshes[k] for k in np.unique(scene.mesh_of[numbers]))
+        if not len(numbers):
+            return None
+        return CameraSearch(numbers, self.tracer.bound(scene, numbers.tolist(), stats))
+
     def foresee(self, gbuffer: GBuffer, stats: Stats) -> None:
         """Choose maps for the frame's shadows that are as fine as its reflections need them, too."""
         self.tracer.chosen = {}
@@ -133,7 +152,8 @@ class Ldt(RayMethod):
         self.tracer.drop_old_maps()
         stats.counters["objects_skipped"] = self.tracer.meshes_without_maps(self.scene)
         radiance = summed_by_pixel(gbuffer.reflector_pixels, rays, followed.radiance)
-        return ReflectedLight(radiance, FirstHits.of(gbuffer, followed), followed, chosen)
+        first_hits = FirstHits.of(gbuffer, followed)
+        return ReflectedLight(radiance, first_hits, followed, chosen, self.tracer.searched_by_camera)
 
     def regions(self, gbuffer: GBuffer, rays: RayBuffer, bounce: int, stats: Stats) -> Regions:
         """Cull the rays of a bounce, and choose how fine the maps must be that they are searched for in."""
@@ -160,6 +180,8 @@ class Ldt(RayMethod):
         both frames must be the same.
         """
         if reusable is None or (self._chooses and limits.most > 1):
+            return False
+        if reusable.reflected.searched_by_camera != self.tracer.searched_by_camera:
             return False
         then, chosen = reusable.reflected.resolutions, self.tracer.chosen
         return all(then[mesh] == chosen[mesh] for mesh in then.keys() & chosen.keys())

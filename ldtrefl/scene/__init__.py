@@ -1,9 +1,10 @@
 """What a scene file says: camera, environment, lights and objects, their meshes and materials, and procedural shapes.
 
     description.py      the dataclasses of a scene; load.py reads them from a file, toml_text.py the TOML in it
-    placement.py        where an object stands; places.py has one stand in many places
+    placement.py        where an object stands; layout.py has all of a scene, places.py has one stand in many places
     mesh.py             a triangle mesh, checked; mesh_arrays.py goes over its arrays
-    normals.py          vertex normals, with welding.py and two_sided.py
+    shared_geometries.py  one mesh for all objects of the same file or shape
+    normals.py          vertex normals, with welding.py, two_sided.py and winding.py
     outliers.py         the few triangles far outside a mesh's bulk
     convexity.py        whether rays that leave a mesh can come back to it
     shapes/             procedural meshes, one a file

@@ -20,6 +20,9 @@ half the longest side of the box about it, as far as rays start above their own 
 SAMPLES = 16
 """Triangles over whose planes all vertices are tested first: most meshes that are not convex show it here."""
 
+MOST_SAMPLED = 1 << 12
+"""Triangles, about, that are looked at before all are."""
+
 WHOLE = 1e-3
 """How far the solid angle of a closed surface may be off the whole sphere's, as a share."""
 
@@ -31,26 +34,50 @@ def sides_with_returns(vertices: np.ndarray, faces: np.ndarray) -> int:
         vertices: (n, 3) float64, whose box has a longest side of about 2.
         faces: (m, 3) int32.
     """
-    normals = np.cross(vertices[faces[:, 1]] - vertices[faces[:, 0]], vertices[faces[:, 2]] - vertices[faces[:, 0]])
-    lengths = np.linalg.norm(normals, axis=1)
+    if _returns_surely(vertices, faces):
+        return FRONT | BACK
+    normals, has_area = _normals(vertices, faces)
     # A triangle without area meets no ray and sends none.
-    faces, normals = faces[lengths > 0.0], normals[lengths > 0.0] / lengths[lengths > 0.0, None]
+    faces, normals = faces[has_area], normals[has_area]
     if len(faces) == 0:
         return 0
-    used = vertices[np.unique(faces)]
-    sample = np.linspace(0, len(faces) - 1, SAMPLES).astype(int)
-    sides = FRONT | BACK
-    for k in sample:
-        heights = (used - vertices[faces[k, 0]]) @ normals[k]
-        sides &= (FRONT if heights.max() <= RISE else 0) | (BACK if heights.min() >= -RISE else 0)
-        if sides == 0:
-            return FRONT | BACK
+    sides = _sides_with_rises(vertices[np.unique(faces)], vertices, faces, normals)
+    if sides == 0:
+        return FRONT | BACK
     if sides == FRONT | BACK:
         return 0  # all vertices lie in one plane
     outwards = normals if sides == FRONT else -normals
     if not _is_convex(vertices, faces if sides == FRONT else faces[:, ::-1], outwards):
         return FRONT | BACK
     return BACK if sides == FRONT else FRONT
+
+
+def _normals(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(m, 3) unit normals of triangles, and (m,) whether they have an area; those that have none have no normal."""
+    normals = np.cross(vertices[faces[:, 1]] - vertices[faces[:, 0]], vertices[faces[:, 2]] - vertices[faces[:, 0]])
+    lengths = np.linalg.norm(normals, axis=1)
+    has_area = lengths > 0.0
+    return normals / np.where(has_area, lengths, 1.0)[:, None], has_area
+
+
+def _sides_with_rises(used: np.ndarray, vertices: np.ndarray, faces: np.ndarray, normals: np.ndarray) -> int:
+    """Of a sample of triangles: ``FRONT`` if no used vertex rises over the front of any, ``BACK`` if none does over the
+    back, both if all lie in the planes of all."""
+    sides = FRONT | BACK
+    for k in np.linspace(0, len(faces) - 1, SAMPLES).astype(int):
+        heights = (used - vertices[faces[k, 0]]) @ normals[k]
+        sides &= (FRONT if heights.max() <= RISE else 0) | (BACK if heights.min() >= -RISE else 0)
+        if sides == 0:
+            break
+    return sides
+
+
+def _returns_surely(vertices: np.ndarray, faces: np.ndarray) -> bool:
+    """Whether some triangles alone show that rays can come back to a mesh; large meshes need not be looked at whole."""
+    some = faces[:: max(1, len(faces) // MOST_SAMPLED)]
+    normals, has_area = _normals(vertices, some)
+    some, normals = some[has_area], normals[has_area]
+    return len(some) > 0 and _sides_with_rises(vertices[some[:, 0]], vertices, some, normals) == 0
 
 
 def _is_convex(vertices: np.ndarray, faces: np.ndarray, normals: np.ndarray) -> bool:

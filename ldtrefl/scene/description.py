@@ -39,7 +39,7 @@ from ldtrefl.base.notices import warn_once
 from ldtrefl.files.picture_reading import stored_picture
 from ldtrefl.files.stored_picture import StoredPicture
 from ldtrefl.scene import shapes
-from ldtrefl.scene.layout import Layout, share_geometries
+from ldtrefl.scene.layout import Layout
 from ldtrefl.scene.mesh import Mesh
 from ldtrefl.scene.placement import placement
 from ldtrefl.scene.readers import load_mesh
@@ -323,15 +323,7 @@ class Scene:
         Raises:
             InputError: a mesh cannot be had, or an object's size is not allowed.
         """
-        share_geometries(self.objects)
-        names = ("geometry", "fit", "scale", "rotate", "translate")
-        layout = Layout.of(*([getattr(entry, name) for entry in self.objects] for name in names))
-        for number in layout.wrong:
-            try:
-                self.objects[number].world_from_object()
-            except InputError as error:
-                raise error.within(f"object[{number}]") from None
-        return layout
+        return Layout.of(self.objects)
 
     @functools.cached_property
     def layout_box(self) -> np.ndarray:

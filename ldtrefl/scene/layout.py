@@ -10,41 +10,31 @@ from typing import Protocol
 
 import numpy as np
 
+from ldtrefl.base.errors import InputError
 from ldtrefl.scene.mesh import Mesh
 from ldtrefl.scene.placement import placements, wrong_sizes
+from ldtrefl.scene.shared_geometries import HasGeometry, SharedGeometries
 
 CORNERS = np.array(np.meshgrid([0, 1], [0, 1], [0, 1])).reshape(3, -1).T
 """(8, 3): of a box's corners, along each axis 0 for its low and 1 for its high side."""
 
 
-class _HasGeometry(Protocol):
-    """An object of a scene (``description.py``)."""
+class _Placed(HasGeometry, Protocol):
+    """An object of a scene (``description.py``), with what places it."""
 
     @property
-    def shape(self) -> str | None: ...
+    def fit(self) -> float | None: ...
 
     @property
-    def mesh(self) -> str | Mesh | None: ...
+    def scale(self) -> float | tuple[float, float, float]: ...
 
     @property
-    def params(self) -> Mapping[str, object]: ...
+    def rotate(self) -> tuple[float, float, float, float]: ...
 
     @property
-    def geometry(self) -> Mesh: ...
+    def translate(self) -> tuple[float, float, float]: ...
 
-    def share_geometry(self, mesh: Mesh) -> None: ...
-
-
-def share_geometries(objects: Sequence[_HasGeometry]) -> None:
-    """Give the objects that have no mesh yet theirs, one for all that name the same file, or shape and parameters."""
-    made: dict[tuple[str | None, str | Mesh | None, str], Mesh] = {}
-    for entry in objects:
-        if "geometry" not in vars(entry):
-            source = entry.shape, entry.mesh, repr(entry.params)
-            if source in made:
-                entry.share_geometry(made[source])
-            else:
-                made[source] = entry.geometry
+    def world_from_object(self) -> np.ndarray: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,27 +49,29 @@ class Layout:
     """(n, 4, 4) float64."""
 
     @classmethod
-    def of(
-        cls,
-        meshes: Sequence[Mesh],
-        fit: Sequence[float | None],
-        scale: Sequence[float | tuple[float, float, float]],
-        rotate: Sequence[tuple[float, float, float, float]],
-        translate: Sequence[tuple[float, float, float]],
-    ) -> Layout:
-        """Lay out objects, given the mesh of each and how it is placed; some may not be allowed (``wrong``)."""
+    def of(cls, objects: Sequence[_Placed]) -> Layout:
+        """Lay out objects; those without a mesh are given theirs.
+
+        Raises:
+            InputError: a mesh cannot be had, or an object's size along an axis is not allowed.
+        """
+        shared = SharedGeometries()
+        for entry in objects:
+            shared.give(entry)
+        meshes = [entry.geometry for entry in objects]
         numbers = {mesh: number for number, mesh in enumerate(dict.fromkeys(meshes))}
         mesh_of = np.fromiter(map(numbers.__getitem__, meshes), np.int64, len(meshes))
+        fitted = np.array([np.nan if entry.fit is None else entry.fit for entry in objects], float)
+        scales = [entry.scale if isinstance(entry.scale, tuple) else (entry.scale,) * 3 for entry in objects]
+        turns, positions = [entry.rotate for entry in objects], [entry.translate for entry in objects]
         bounds = np.array([mesh.fit_bounds for mesh in numbers]).reshape(-1, 2, 3)[mesh_of]
-        fitted = np.array([np.nan if side is None else side for side in fit], float)
-        scales = [factor if isinstance(factor, tuple) else (factor,) * 3 for factor in scale]
-        matrices = placements(bounds, fitted, _rows(scales, 3), _rows(rotate, 4), _rows(translate, 3))
+        matrices = placements(bounds, fitted, _rows(scales, 3), _rows(turns, 4), _rows(positions, 3))
+        for number in wrong_sizes(matrices, bounds):
+            try:
+                objects[number].world_from_object()
+            except InputError as error:
+                raise error.within(f"object[{number}]") from None
         return cls(tuple(numbers), mesh_of, matrices)
-
-    @property
-    def wrong(self) -> np.ndarray:
-        """Numbers of the objects whose size along an axis is not allowed."""
-        return wrong_sizes(self.world_from_object, self._bounds[self.mesh_of])
 
     def with_objects(self, changed: Mapping[int, tuple[Mesh, np.ndarray]]) -> Layout:
         """The same but for some objects, given the number, the mesh and ``world_from_object`` of each."""

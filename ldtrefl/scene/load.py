@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import json
 import os
 import typing
 from collections.abc import Callable, Iterator
@@ -23,6 +22,7 @@ from ldtrefl.base.errors import InputError, first_fault
 from ldtrefl.scene.description import Environment, Object, Scene
 from ldtrefl.scene.mesh import Mesh
 from ldtrefl.scene.places import split_places, standing_in
+from ldtrefl.scene.shared_geometries import SharedGeometries
 from ldtrefl.scene.toml_text import read_toml
 
 MESH_PATH_VARIABLE = "LDTREFL_MESH_PATH"
@@ -74,12 +74,11 @@ def _found(scene: Scene, places: dict[int, np.ndarray], path: Path) -> Scene:
     """The scene with every file found and read, and its objects in their ``places``; a fault names the key."""
     count = len(scene.objects) - len(places) + sum(map(len, places.values()))
     _at(path, "object", lambda: budget.take(OBJECT_BYTES * count, f"a list of {count}"))
-    # What several objects share is made once, and so is taken from the budget once.
-    meshes: dict[tuple[str | None, str, str], Mesh] = {}
+    shared = SharedGeometries()
     objects: list[Object] = []
     for index, entry in enumerate(scene.objects):
         key = f"object[{index}]"
-        found = _found_object(entry, key, path, meshes)
+        found = _found_object(entry, key, path, shared)
         if index in places:
             objects += _at(path, key, functools.partial(standing_in, found, places[index]))
         else:
@@ -104,15 +103,11 @@ def _keys(tables: int, places: dict[int, np.ndarray]) -> Iterator[str]:
             yield f"object[{index}]"
 
 
-def _found_object(entry: Object, key: str, path: Path, meshes: dict[tuple[str | None, str, str], Mesh]) -> Object:
-    """An object with its mesh and texture read; ``meshes`` are those of the objects before it, and its own is added."""
+def _found_object(entry: Object, key: str, path: Path, shared: SharedGeometries) -> Object:
+    """An object with its mesh and texture read; ``shared`` has the meshes of those before it."""
     found = _with_files_found(entry, key, path)
-    source = found.shape, str(found.mesh), json.dumps(found.params, sort_keys=True, default=str)
-    if source in meshes:
-        found.share_geometry(meshes[source])
-    else:
-        kind = "mesh" if entry.shape is None else "shape"
-        meshes[source] = _at(path, f"{key}.{kind}", lambda: found.geometry)
+    kind = "mesh" if entry.shape is None else "shape"
+    _at(path, f"{key}.{kind}", lambda: shared.give(found))
     if found.material.texture is not None:
         _at(path, f"{key}.material.texture", lambda: found.texture)
         if found.geometry.uvs is None:

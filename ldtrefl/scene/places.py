@@ -22,6 +22,7 @@ from pydantic import AfterValidator, BeforeValidator, TypeAdapter, ValidationErr
 from ldtrefl.base.checked import LARGEST, SMALLEST, Number, Positive
 from ldtrefl.base.errors import InputError, first_fault
 from ldtrefl.scene.description import Object
+from ldtrefl.scene.mesh import Mesh
 
 
 def _with_scale(row: object) -> object:
@@ -78,17 +79,22 @@ def standing_in(entry: Object, places: np.ndarray) -> list[Object]:
             dataclasses.replace(entry, translate=translate[number], scale=scale[number])
         except InputError as error:
             raise error.within(f"places[{number}]") from None
+    kept = {field.name: getattr(entry, field.name) for field in dataclasses.fields(entry)}
     factors = map(tuple, scale.tolist()) if scale.ndim == 2 else scale.tolist()
     values = enumerate(zip(factors, map(tuple, translate.tolist()), strict=True))
     return [
-        _like(entry, name=f"{entry.name}.{number}" if entry.name else "", scale=factor, translate=position)
+        _unchecked(
+            {**kept, "name": f"{entry.name}.{number}" if entry.name else "", "scale": factor, "translate": position},
+            entry.geometry,
+        )
         for number, (factor, position) in values
     ]
 
 
-def _like(entry: Object, **changes: object) -> Object:
-    """A copy of an object, with its mesh, but for ``changes``. It is not checked again: that would take longer than
-    reading the file, and an object that gives back too much light would be warned of once a place."""
-    copy = object.__new__(Object)
-    object.__setattr__(copy, "__dict__", {**vars(entry), **changes})
-    return copy
+def _unchecked(values: dict[str, object], geometry: Mesh) -> Object:
+    """An object of these values, which it takes over, and a mesh. They are not checked again: that would take longer
+    than reading the file, and an object that gives back too much light would be warned of once a place."""
+    made = object.__new__(Object)
+    object.__setattr__(made, "__dict__", values)
+    made.share_geometry(geometry)
+    return made

@@ -8,13 +8,12 @@ from __future__ import annotations
 import warp as wp
 
 from ldtrefl.geometry.triangle import ONE_THIRD, plane_coordinates
-from ldtrefl.geometry.vectors import as_double, as_single
-from ldtrefl.shading.specular import schlick
+from ldtrefl.geometry.vectors import as_single
 from ldtrefl.shading.textures import sample_texture
 from ldtrefl.world.records import ObjectRecord
 
-SMALLEST_NORMAL = wp.constant(1.0e-12)
-"""Squared length of an interpolated normal below which the facet's normal is taken."""
+LEAST_TURN = wp.constant(1.0e-12)
+"""Turns of a normal below this count as this."""
 
 SMALLEST_SINE = wp.constant(1.0e-6)
 """Squared sine of a triangle's corner below which barycentrics are not extended beyond the triangle."""
@@ -58,29 +57,7 @@ def extended_coordinates(record: ObjectRecord, triangle: int, point: wp.vec3d) -
         return middle + offset  # there may be no normals, and none is interpolated
     na = record.normals[corners[0]]
     turn = wp.length(offset[0] * (record.normals[corners[1]] - na) + offset[1] * (record.normals[corners[2]] - na))
-    return middle + wp.min(1.0, FARTHEST_TURN * wp.length(na) / wp.max(turn, SMALLEST_NORMAL)) * offset
-
-
-@wp.func
-def interpolated_normal(
-    objects: wp.array(dtype=ObjectRecord), index: int, corners: wp.vec3i, u: float, v: float, facet: wp.vec3
-) -> wp.vec3:
-    """The vertex normals interpolated at barycentrics (u, v), in device space, of any length, on the side of the
-    facet's normal; that one itself where the object is not smooth, or the vertex normals say nothing."""
-    normal = wp.vec3(0.0)
-    if objects[index].smooth != 0:
-        interpolated = (
-            (1.0 - u - v) * objects[index].normals[corners[0]]
-            + u * objects[index].normals[corners[1]]
-            + v * objects[index].normals[corners[2]]
-        )
-        if wp.dot(interpolated, interpolated) > SMALLEST_NORMAL:
-            normal = objects[index].normal_from_unit * wp.normalize(interpolated)
-            if wp.dot(normal, facet) < 0.0:
-                normal = -normal
-    if normal == wp.vec3(0.0):
-        return facet
-    return normal
+    return middle + wp.min(1.0, FARTHEST_TURN * wp.length(na) / wp.max(turn, LEAST_TURN)) * offset
 
 
 @wp.func
@@ -98,14 +75,13 @@ def part_of(objects: wp.array(dtype=ObjectRecord), index: int, triangle: int) ->
 
 
 @wp.func
-def albedo_at(
-    objects: wp.array(dtype=ObjectRecord), index: int, triangle: int, corners: wp.vec3i, u: float, v: float
-) -> wp.vec3:
+def albedo_at(objects: wp.array(dtype=ObjectRecord), index: int, triangle: int, u: float, v: float) -> wp.vec3:
     """The albedo at barycentrics (u, v) of a triangle: the object's, times that of the mesh's part and its texture."""
     part = part_of(objects, index, triangle)
     color = wp.cw_mul(objects[index].albedo, objects[index].part_color[part])
     place = objects[index].part_texture[part]
     if place[1] > 0:
+        corners = objects[index].faces[triangle]
         uv = (
             (1.0 - u - v) * objects[index].uvs[corners[0]]
             + u * objects[index].uvs[corners[1]]
@@ -113,36 +89,6 @@ def albedo_at(
         )
         color = wp.cw_mul(color, sample_texture(objects, index, place, uv))
     return color
-
-
-@wp.func
-def surface_at(
-    objects: wp.array(dtype=ObjectRecord), index: int, triangle: int, u: float, v: float, view: wp.vec3
-) -> Surface:
-    """The surface of object ``index`` at barycentrics (u, v) of ``triangle``, seen along unit direction ``view``."""
-    corners = objects[index].faces[triangle]
-    a, b, c = (
-        objects[index].vertices[corners[0]],
-        objects[index].vertices[corners[1]],
-        objects[index].vertices[corners[2]],
-    )
-    surface = Surface()
-    surface.object = index
-    surface.triangle = triangle
-    point = (1.0 - u - v) * a + u * b + v * c
-    surface.position = wp.transform_point(objects[index].device_from_unit, as_double(point))
-    facet = objects[index].normal_from_unit * wp.normalize(wp.cross(b - a, c - a))
-    if wp.dot(facet, view) > 0.0:
-        facet = -facet  # to the side that the viewer sees
-        surface.is_back = 1
-    surface.facet = wp.normalize(facet)
-    surface.normal = wp.normalize(interpolated_normal(objects, index, corners, u, v, facet))
-    surface.albedo = albedo_at(objects, index, triangle, corners, u, v)
-    surface.emission = objects[index].emission
-    surface.mirror = objects[index].mirror
-    if objects[index].fresnel != 0:
-        surface.mirror = schlick(surface.mirror, -wp.dot(surface.normal, view))
-    return surface
 
 
 @wp.func

@@ -38,7 +38,7 @@ class Hits:
     """Rays that were not finite or had no direction; they count as misses."""
 
 
-FILES = ("device/vectors.h", "tracing/ray_batch.h")
+FILES = ("device/vectors.h", "tracing/ray_query.h", "tracing/ray_batch.h")
 """The headers that the native functions of this file include."""
 
 START = """

@@ -6,6 +6,7 @@ triangles that share an edge or a vertex, stands in ``bvh_walk.py``.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 
 import numpy as np
@@ -29,50 +30,46 @@ from ldtrefl.tracing.hit import Hit, no_hit
 from ldtrefl.tracing.outlier_hits import is_outlier_met, merge_outliers
 from ldtrefl.tracing.tracer import Query, Tracer, array_of_views
 from ldtrefl.world.device_mesh import DeviceMesh
-from ldtrefl.world.unit_rays import SPHERE_RADIUS
+from ldtrefl.world.unit_rays import SPHERE_RADIUS, distance_passed
 
 LEAF_TRIANGLES = 4
 """Triangles in a leaf of the tree, at most. With 1 rays take a seventh longer, and the tree a third longer to build;
 with 8 rays take as long."""
 
 
-@wp.struct
-class Approach:
-    """Where a ray comes near the object: outside the sphere about the unit cube, if it starts outside."""
+def from_nearby(walk: Callable[..., wp.vec4d]) -> Callable[..., wp.vec4d]:
+    """``walk`` as a function of a ``Query``: it starts where the ray comes near the object."""
 
-    start: wp.vec3d
-    passed: wp.float64  # t of the start
+    @wp.func
+    def walk_from_nearby(views: wp.array(dtype=BvhView), index: int, query: Query) -> wp.vec4d:
+        if not query.t_max > 0.0:
+            return wp.vec4d(wp.float64(0.0), wp.float64(0.0), wp.float64(0.0), wp.float64(-1.0))
+        passed = distance_passed(query.origin, query.direction, SPHERE_RADIUS)
+        start = query.origin + passed * as_double(query.direction)
+        found = walk(views, index, start, query.direction, wp.float64(query.t_max) - passed)
+        found[0] = passed + found[0]
+        return found
 
-
-@wp.func
-def approach(query: Query) -> Approach:
-    """Skip the part of a ray that lies before the object."""
-    near = Approach()
-    direction = as_double(query.direction)
-    square = wp.dot(direction, direction)
-    along = -wp.dot(query.origin, direction) - SPHERE_RADIUS * wp.sqrt(square)
-    near.passed = wp.max(along, wp.float64(0.0)) / square
-    near.start = query.origin + near.passed * direction
-    return near
+    return walk_from_nearby
 
 
 @launch.once
 def bvh_tracer(to_first: Callable[..., wp.vec4d], to_any: Callable[..., wp.vec4d]) -> Tracer:
     """The tracer over trees of Warp's, by functions like ``walk_to_first`` and ``walk_to_any`` of ``bvh_walk.py``."""
 
+    first_met, any_met = from_nearby(to_first), from_nearby(to_any)
+
     @wp.func
     def closest_hit_in_bulk(views: wp.array(dtype=BvhView), index: int, query: Query) -> Hit:
         """The first triangle that a ray meets, outliers left out."""
         hit = no_hit()
-        if query.t_max > 0.0:
-            near = approach(query)
-            found = to_first(views, index, near.start, query.direction, wp.float64(query.t_max) - near.passed)
-            if found[3] >= wp.float64(0.0):
-                hit.t = float(near.passed + found[0])
-                hit.triangle = int(found[3])
-                hit.u = float(found[1])
-                hit.v = float(found[2])
-                hit.normal = unit_facet_normal(views[index], hit.triangle)
+        found = first_met(views, index, query)
+        if found[3] >= wp.float64(0.0):
+            hit.t = float(found[0])
+            hit.triangle = int(found[3])
+            hit.u = float(found[1])
+            hit.v = float(found[2])
+            hit.normal = unit_facet_normal(views[index], hit.triangle)
         return hit
 
     @wp.func
@@ -93,11 +90,7 @@ def bvh_tracer(to_first: Callable[..., wp.vec4d], to_any: Callable[..., wp.vec4d
         """The tracer's ``occluded``. It does not need ``outwards``: rays start above the triangle that they leave."""
         if is_outlier_met(views[index].outliers, query):
             return True
-        if not query.t_max > 0.0:
-            return False
-        near = approach(query)
-        found = to_any(views, index, near.start, query.direction, wp.float64(query.t_max) - near.passed)
-        return found[3] >= wp.float64(0.0)
+        return any_met(views, index, query)[3] >= wp.float64(0.0)
 
     @wp.func
     def any_hits_bvh(
@@ -173,11 +166,13 @@ class Raycaster:
         Raises:
             InputError: the arrays' shapes do not fit, or they hold no numbers.
         """
-        return trace_batch(BVH, self._views(), self.geometry, origins, directions, t_max)
+        return trace_batch(BVH, self._views, self.geometry, origins, directions, t_max)
 
     def occluded(self, origins: RayArray, directions: RayArray, t_max: RayArray | None = None) -> np.ndarray | wp.array:
         """(...) bool: whether rays meet the mesh at all. Arguments and errors are those of :meth:`trace`."""
-        return occluded_batch(BVH, self._views(), self.geometry, origins, directions, t_max)
+        return occluded_batch(BVH, self._views, self.geometry, origins, directions, t_max)
 
+    @functools.cached_property
     def _views(self) -> wp.array:
+        """:meth:`view` as kernels read it."""
         return array_of_views([self.view()], BvhView, self.geometry.vertices.device)

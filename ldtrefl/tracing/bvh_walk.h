@@ -69,16 +69,8 @@ struct BvhWalk : TriangleTest {
         for (int i = begin; i < end; ++i) {
             const int triangle = mesh.tree.items[i];
             Meeting met;
-            if (meet_numbered(mesh.vertices, mesh.faces, triangle, line, met)) keep_nearer(met, triangle, nearest);
+            if (meet_numbered(line, mesh.vertices, mesh.faces, triangle, met)) keep_nearer(met, triangle, nearest);
         }
-    }
-
-    SHARED bool meet_numbered(const float* vertices, const int* faces, int triangle, const Line& line, Meeting& met) {
-        const int* corners = faces + 3 * (size_t)triangle;
-        return meet(
-            line, vertices + 3 * (size_t)corners[0], vertices + 3 * (size_t)corners[1], vertices + 3 * (size_t)corners[2],
-            met
-        );
     }
 
     SHARED void keep_nearer(const Meeting& met, int triangle, Nearest& nearest) {

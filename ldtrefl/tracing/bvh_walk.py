@@ -3,7 +3,7 @@ closed mesh none passes.
 
 A triangle is tested in float64 (``triangle_test.h``), so that triangles share their edges exactly. The boxes of the
 tree are wider than their triangles by what is rounded where a ray is tested against them, so that no box is missed
-whose triangle is met. For vertices that have moved, boxes are made anew (:func:`box_triangles`) and the tree refitted.
+whose triangle is met.
 
 The walk (``bvh_walk.h``) reads the nodes of Warp's tree: Warp's own query does not visit the nearest child first, and
 takes two to three times as long. It stands in for the walk where this version of Warp is not known, and gives the same
@@ -16,6 +16,7 @@ import warp as wp
 
 from ldtrefl.device import launch, warp_abi
 from ldtrefl.device.native_sources import native_body
+from ldtrefl.geometry.triangle import facet_normal
 from ldtrefl.geometry.vectors import as_double, as_single
 from ldtrefl.world.outliers import Outliers
 
@@ -96,11 +97,9 @@ def walk_to_any(
 ASK = """
     auto& view = views.data[index];
     const TriangleTest::Line line = TriangleTest::line_of(&start[0], &direction[0]);
-    const int* corners = &view.faces.data[triangle][0];
+    const float* vertices = &view.vertices.data[0][0];
     TriangleTest::Meeting met;
-    const float *a = &view.vertices.data[corners[0]][0], *b = &view.vertices.data[corners[1]][0];
-    const bool is_met = TriangleTest::meet(line, a, b, &view.vertices.data[corners[2]][0], met);
-    if (!is_met) met = {-1.0, 0.0, 0.0};
+    if (!TriangleTest::meet_numbered(line, vertices, &view.faces.data[0][0], triangle, met)) met = {-1.0, 0.0, 0.0};
     return wp::vec_t<4, wp::float64>(met.t, met.u, met.v, (double)triangle);
 """
 
@@ -154,8 +153,7 @@ def query_any(
 
 @wp.func
 def unit_facet_normal(view: BvhView, triangle: int) -> wp.vec3:
-    """A triangle's unit normal by its winding, in float64: of a slim triangle's cross product float32 leaves little."""
+    """A triangle's unit normal by its winding."""
     corners = view.faces[triangle]
-    a = as_double(view.vertices[corners[0]])
-    edge_u, edge_v = as_double(view.vertices[corners[1]]) - a, as_double(view.vertices[corners[2]]) - a
-    return as_single(wp.normalize(wp.cross(edge_u, edge_v)))
+    a, b, c = view.vertices[corners[0]], view.vertices[corners[1]], view.vertices[corners[2]]
+    return as_single(facet_normal(as_double(a), as_double(b), as_double(c)))

@@ -10,14 +10,15 @@ from collections.abc import Callable
 import warp as wp
 
 from ldtrefl.device import launch
+from ldtrefl.device.bits import lowest_bit
 from ldtrefl.geometry.sphere import meets_sphere, sphere_entry
 from ldtrefl.geometry.vectors import as_single
 from ldtrefl.tracing.hit import Hit
-from ldtrefl.tracing.object_sets import RUN, ObjectSets, is_listed, lowest_bit, object_listed, objects_listed
+from ldtrefl.tracing.object_sets import RUN, ObjectSets, is_listed, object_listed, objects_listed
 from ldtrefl.tracing.ray_buffers import HitBuffer, RayBuffer, keep_nearer, set_miss
 from ldtrefl.tracing.tracer import Query, Tracer
 from ldtrefl.world.records import ObjectRecord
-from ldtrefl.world.unit_rays import facet_towards, into_unit, start_above_own
+from ldtrefl.world.unit_rays import UnitRay, facet_towards, into_unit, start_above_own
 
 BEYOND = wp.constant(1.000001)
 """Factor on a ray's nearest distance so far, up to which the next object is searched: a hit in the same place must be
@@ -40,14 +41,14 @@ def first_entered(
 ) -> int:
     """Of the entries from ``begin`` on of a run's list that are left, a bit each, the one whose object a ray enters
     first, by bounding spheres; any of them if it enters none."""
-    first = begin + lowest_bit(left)
+    first = begin + lowest_bit(wp.uint64(left))
     rest = left & (left - wp.uint32(1))
     nearest = float(-1.0)
     if rest != wp.uint32(0):
         k = object_listed(sets, run, first)
         nearest = sphere_entry(origin, direction, objects[k].centre, objects[k].radius)
     while rest != wp.uint32(0):
-        entry = begin + lowest_bit(rest)
+        entry = begin + lowest_bit(wp.uint64(rest))
         k = object_listed(sets, run, entry)
         entered = sphere_entry(origin, direction, objects[k].centre, objects[k].radius)
         if entered >= 0.0 and (entered < nearest or nearest < 0.0):
@@ -75,61 +76,51 @@ def may_meet(record: ObjectRecord, origin: wp.vec3d, direction: wp.vec3, t_max: 
     return entry >= 0.0 and entry <= t_max
 
 
-@wp.struct
-class SearchedRay:
-    """A ray that is searched for in an object."""
-
-    query: Query
-    ray: int  # its number
-    stretch: float  # length in the object's unit space of a device unit along it
-
-
 @launch.once
-def searched_of(tracer: Tracer) -> Callable[..., SearchedRay]:
-    """``searched_ray(views, objects, k, rays, i, t_max)``: ray ``i`` as it is searched for in object ``k``,
-    up to ``t_max``."""
+def query_of(tracer: Tracer) -> Callable[..., Query]:
+    """``query_for(views, objects, k, rays, i, ray, t_max)``: what object ``k`` is asked about ray ``i``, which is
+    ``ray`` there, up to ``t_max``."""
     leaving = tracer.leaving
 
     @wp.func
-    def searched_ray(
+    def query_for(
         views: wp.array(dtype=tracer.view),
         objects: wp.array(dtype=ObjectRecord),
         k: int,
         rays: RayBuffer,
         i: int,
+        ray: UnitRay,
         t_max: float,
-    ) -> SearchedRay:
-        ray = into_unit(objects[k], rays.origin[i], rays.direction[i])
-        searched = SearchedRay()
-        searched.ray = i
-        searched.stretch = ray.stretch
-        searched.query.origin = ray.origin
-        searched.query.direction = ray.direction
+    ) -> Query:
+        query = Query()
+        query.origin = ray.origin
+        query.direction = ray.direction
         # t stays in device units: divide by the direction's length in unit space.
-        searched.query.t_max = t_max * ray.stretch
+        query.t_max = t_max * ray.stretch
         if rays.source[i] == k:
             triangle = rays.source_triangle[i]
-            searched.query.origin = start_above_own(objects[k], triangle, ray.origin, ray.direction)
-            outwards = as_single(facet_towards(objects[k], triangle, ray.direction))
-            searched.query = leaving(views, k, searched.query, outwards)
-        return searched
+            outwards = facet_towards(objects[k], triangle, ray.direction)
+            query.origin = start_above_own(objects[k], triangle, ray.origin, outwards)
+            query = leaving(views, k, query, as_single(outwards))
+        return query
 
-    return searched_ray
+    return query_for
 
 
 @wp.func
 def keep_found(
     record: ObjectRecord,
     rays: RayBuffer,
-    searched: SearchedRay,
+    i: int,
     k: int,
+    stretch: float,
     found: Hit,
     in_sphere_only: bool,
     hits: HitBuffer,
 ):
-    """Count a search in object ``k``, and keep what it found if that is nearer than what the ray has met so far. With
-    ``in_sphere_only`` a hit counts only if the ray meets the bounding sphere."""
-    i = searched.ray
+    """Count a search for ray ``i`` in object ``k``, where a device unit along it has a length of ``stretch``, and keep
+    what it found if that is nearer than what the ray has met so far. With ``in_sphere_only`` a hit counts only if the
+    ray meets the bounding sphere."""
     hits.steps[i] = hits.steps[i] + found.steps
     hits.searches[i] = hits.searches[i] + 1
     is_met = found.triangle >= 0
@@ -137,14 +128,14 @@ def keep_found(
         # Patches of coarse maps may stick out of the bounding sphere, where a search by bounds does not look.
         is_met = may_meet(record, rays.origin[i], rays.direction[i], wp.inf)
     if is_met:
-        keep_nearer(hits, i, k, found.t / searched.stretch, found)
+        keep_nearer(hits, i, k, found.t / stretch, found)
 
 
 @launch.once
 def closest_hits_kernel(tracer: Tracer, block: int, bounds: bool = True) -> wp.Kernel:
     """The kernel that finds where rays end; one item follows ``block`` rays. With ``bounds`` an object is searched only
     for rays that enter its sphere before their nearest hit so far; of a group the first entered comes first."""
-    find_hits, searched_ray = tracer.closest_hits, searched_of(tracer)
+    find_hits, query_for = tracer.closest_hits, query_of(tracer)
     size, to_infinity = wp.constant(block), wp.constant(not bounds)
 
     @launch.kernel
@@ -164,7 +155,8 @@ def closest_hits_kernel(tracer: Tracer, block: int, bounds: bool = True) -> wp.K
         query_memory, hit_memory = wp.zeros(shape=size, dtype=Query), wp.zeros(shape=size, dtype=Hit)
         queries = wp.array(ptr=query_memory.ptr, shape=(size,), dtype=Query)
         found = wp.array(ptr=hit_memory.ptr, shape=(size,), dtype=Hit)
-        searched = wp.zeros(shape=size, dtype=SearchedRay)
+        # Of each query its ray's number, and the length in unit space of a device unit along it.
+        searched, stretches = wp.zeros(shape=size, dtype=wp.int32), wp.zeros(shape=size, dtype=wp.float32)
         lead = int(-1)  # the first ray that is alive: objects are searched in the order in which it enters them
         for i in range(begin, end):
             set_miss(hits, i)
@@ -185,12 +177,14 @@ def closest_hits_kernel(tracer: Tracer, block: int, bounds: bool = True) -> wp.K
                     if can_meet(sets, rays, run, entry, k, i):
                         if to_infinity or may_meet(objects[k], rays.origin[i], rays.direction[i], hits.t[i]):
                             t_max = wp.where(to_infinity, wp.inf, BEYOND * hits.t[i])
-                            searched[count] = searched_ray(views, objects, k, rays, i, t_max)
-                            queries[count] = searched[count].query
+                            ray = into_unit(objects[k], rays.origin[i], rays.direction[i])
+                            queries[count] = query_for(views, objects, k, rays, i, ray, t_max)
+                            searched[count] = i
+                            stretches[count] = ray.stretch
                             count += 1
                 if count > 0:
                     find_hits(views, k, queries, count, found)
                 for j in range(count):
-                    keep_found(objects[k], rays, searched[j], k, found[j], to_infinity, hits)
+                    keep_found(objects[k], rays, searched[j], k, stretches[j], found[j], to_infinity, hits)
 
     return closest_hits

@@ -12,35 +12,6 @@ import warp as wp
 RUN = wp.constant(64)
 """Rays in a row that share a list: as many as an integer has bits."""
 
-LOWEST_BIT = """
-#if defined(__CUDA_ARCH__)
-    return __ffs((int)word) - 1;
-#else
-    return __builtin_ctz(word);
-#endif
-"""
-
-
-@wp.func_native(LOWEST_BIT)
-def lowest_bit(word: wp.uint32) -> wp.int32:
-    """The number of the lowest bit that is set; undefined if none is."""
-    ...
-
-
-LOWEST_BIT_OF_64 = """
-#if defined(__CUDA_ARCH__)
-    return __ffsll((long long)word) - 1;
-#else
-    return __builtin_ctzll(word);
-#endif
-"""
-
-
-@wp.func_native(LOWEST_BIT_OF_64)
-def lowest_bit_of_64(word: wp.uint64) -> wp.int32:
-    """The number of the lowest bit that is set; undefined if none is."""
-    ...
-
 
 @wp.struct
 class ObjectSets:

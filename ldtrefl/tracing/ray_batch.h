@@ -1,12 +1,6 @@
 // Rays as users give them, on their way into an object's unit space, and what they meet on its way out (batch.py).
 
-struct RayBatch : Vectors {
-    // A ray in unit space, as ``Query`` of tracer.py has it.
-    struct Query {
-        double origin[3];
-        float direction[3], t_max;
-    };
-
+struct RayBatch : RayQuery {
     SHARED bool is_finite(float x) { return x < INFINITY && x > -INFINITY; }
     SHARED bool is_finite(const float* p) { return is_finite(p[0]) && is_finite(p[1]) && is_finite(p[2]); }
 

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
+import numpy as np
+
 from ldtrefl.device.stats import Stats
 from ldtrefl.tracing.bvh import BVH, Raycaster
 from ldtrefl.tracing.bvh_walk import BvhView
@@ -24,16 +26,16 @@ class SceneBvh:
 
     def __init__(self) -> None:
         self._trees: dict[DeviceMesh, Raycaster] = {}
-        self._meshes: list[DeviceMesh] = []
-        """Of the scene, when the tracer was bound."""
+        self._mesh_of: np.ndarray | None = None
+        """The scene's, when the tracer was bound: which object has which mesh."""
         self._bound: BoundTracer | None = None
 
     def bound(self, scene: DeviceScene, objects: Collection[int], stats: Stats) -> BoundTracer:
         """The tracer over all objects."""
-        if self._bound is None or self._meshes != scene.meshes:
+        if self._bound is None or self._mesh_of is not scene.mesh_of:
             with stats.stage("build", scene.device):
                 self._trees = {mesh: self._trees.get(mesh) or Raycaster.of(mesh) for mesh in scene.meshes}
-                self._meshes, trees = list(scene.meshes), list(self._trees.values())
+                self._mesh_of, trees = scene.mesh_of, list(self._trees.values())
                 views = array_of_shared_views([tree.view() for tree in trees], scene.mesh_of, BvhView, scene.device)
                 self._bound = BoundTracer(BVH, views, trees)
         return self._bound

@@ -55,6 +55,15 @@ struct TriangleTest : Vectors {
         return true;
     }
 
+    // The same for a triangle of a mesh, by its number.
+    SHARED bool meet_numbered(const Line& line, const float* vertices, const int* faces, int triangle, Meeting& met) {
+        const int* corners = faces + 3 * (size_t)triangle;
+        return meet(
+            line, vertices + 3 * (size_t)corners[0], vertices + 3 * (size_t)corners[1], vertices + 3 * (size_t)corners[2],
+            met
+        );
+    }
+
     // A corner in the coordinates of a line: x and y across it, z along.
     SHARED void see(const Line& line, const float* corner, double& x, double& y, double& z) {
         UNFUSED

@@ -36,19 +36,20 @@ class CameraView:
     """A camera in device space, and the band of its image that is looked at."""
 
     eye: wp.vec3d
-    right: wp.vec3  # at distance 1, half the image's width long
-    down: wp.vec3  # at distance 1, half the image's height long
-    forward: wp.vec3  # unit
+    right: wp.vec3d  # at distance 1, half the image's width long; float32 would round a telephoto lens' pixels away
+    down: wp.vec3d  # at distance 1, half the image's height long
+    forward: wp.vec3d  # unit
     width: int
     height: int  # of the whole image
     first_row: int  # of the band
 
 
 @wp.func
-def camera_ray(camera: CameraView, x: float, y: float) -> wp.vec3:
+def camera_ray(camera: CameraView, x: wp.float64, y: wp.float64) -> wp.vec3d:
     """Direction through the point (x, y) of the band, in pixels."""
-    across = 2.0 * x / float(camera.width) - 1.0
-    along = 2.0 * (y + float(camera.first_row)) / float(camera.height) - 1.0
+    one, two = wp.float64(1.0), wp.float64(2.0)
+    across = two * x / wp.float64(camera.width) - one
+    along = two * (y + wp.float64(camera.first_row)) / wp.float64(camera.height) - one
     return camera.forward + across * camera.right + along * camera.down
 
 
@@ -75,9 +76,9 @@ def camera_view(camera: Camera, device_from_world: np.ndarray, band: Band) -> Ca
     half_height = np.tan(np.radians(camera.fov_y) / 2.0)
     view = CameraView()
     view.eye = wp.vec3d(*(device_from_world @ [*camera.eye, 1.0])[:3] + 0.0)
-    view.right = wp.vec3(*(right * half_height * camera.width / camera.height))
-    view.down = wp.vec3(*(down * half_height))
-    view.forward = wp.vec3(*forward)
+    view.right = wp.vec3d(*(right * half_height * camera.width / camera.height))
+    view.down = wp.vec3d(*(down * half_height))
+    view.forward = wp.vec3d(*forward)
     view.width, view.height, view.first_row = camera.width, camera.height, band.first_row
     return view
 

@@ -31,8 +31,15 @@ class DeviceMesh:
     @functools.cached_property
     def reach(self) -> float:
         """How far from the centre of its box the mesh reaches, in unit space."""
-        used = self.mesh.unit_vertices[self.mesh.is_used].astype(float)
-        return float(np.sqrt((used**2).sum(axis=1).max()))
+        vertices, is_used = self.mesh.unit_vertices, self.mesh.is_used
+        used = vertices if is_used.all() else vertices[is_used]
+        return float(np.sqrt(np.einsum("ij,ij->i", used, used, dtype=float).max()))
+
+    @functools.cached_property
+    def unit_bounds(self) -> np.ndarray:
+        """(2, 3) float64: the lowest and highest corner of the box about all triangles, in unit space."""
+        centre, half = self.mesh.unit_frame
+        return (self.mesh.bounds - centre) / half
 
     @functools.cached_property
     def outliers(self) -> Outliers:

@@ -43,6 +43,14 @@ def object_of(numbers: TriangleNumbers, number: int) -> int:
 
 
 @wp.func
+def has_number(numbers: TriangleNumbers, index: int, number: int) -> bool:
+    """Whether a number belongs to object ``index``, -1 for none."""
+    if index < 0 or number < numbers.first[index]:
+        return False
+    return index + 1 == numbers.first.shape[0] or number < numbers.first[index + 1]
+
+
+@wp.func
 def first_triangle_of(numbers: TriangleNumbers, index: int, number: int) -> int:
     """The first triangle of an object that has this number."""
     return (number - numbers.first[index]) << numbers.shift

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import warp as wp
 
+from ldtrefl.geometry.triangle import facet_normal
 from ldtrefl.geometry.vectors import as_double, as_single
 from ldtrefl.world.records import ObjectRecord
 
@@ -45,7 +46,7 @@ def into_unit(record: ObjectRecord, origin: wp.vec3d, direction: wp.vec3) -> Uni
 
 
 @wp.func
-def distance_passed(origin: wp.vec3d, direction: wp.vec3, radius: wp.float64) -> float:
+def distance_passed(origin: wp.vec3d, direction: wp.vec3, radius: wp.float64) -> wp.float64:
     """The t that a ray may skip, because it is still outside a sphere about the unit cube; 0 if it starts inside.
 
     Found in float64: the ray's new origin, near the object, is then rounded to float32 without loss.
@@ -53,7 +54,7 @@ def distance_passed(origin: wp.vec3d, direction: wp.vec3, radius: wp.float64) ->
     exact = as_double(direction)
     square = wp.dot(exact, exact)
     along = -wp.dot(origin, exact) - radius * wp.sqrt(square)
-    return float(wp.max(along, wp.float64(0.0)) / square)
+    return wp.max(along, wp.float64(0.0)) / square
 
 
 @wp.func
@@ -84,21 +85,20 @@ def start_above(start: wp.vec3d, outwards: wp.vec3) -> wp.vec3d:
 def facet_towards(record: ObjectRecord, triangle: int, outwards: wp.vec3) -> wp.vec3d:
     """A triangle's unit normal in unit space, to the side of ``outwards``; 0 if the triangle has no area."""
     corners = record.faces[triangle]
-    a = unit_vertex(record, corners[0])
-    normal = wp.normalize(wp.cross(unit_vertex(record, corners[1]) - a, unit_vertex(record, corners[2]) - a))
+    a, b, c = unit_vertex(record, corners[0]), unit_vertex(record, corners[1]), unit_vertex(record, corners[2])
+    normal = facet_normal(a, b, c)
     if wp.dot(normal, as_double(outwards)) < wp.float64(0.0):
         return -normal
     return normal
 
 
 @wp.func
-def start_above_own(record: ObjectRecord, triangle: int, start: wp.vec3d, outwards: wp.vec3) -> wp.vec3d:
+def start_above_own(record: ObjectRecord, triangle: int, start: wp.vec3d, normal: wp.vec3d) -> wp.vec3d:
     """Where a ray starts that is searched for in the object that it leaves, in unit space.
 
-    It starts above the plane of the triangle that it leaves, to the side of ``outwards``, by the rounding of
-    coordinates there. ``start`` may lie a little off that plane: its hit was rounded, or was on a patch.
+    It starts above the plane of the triangle that it leaves, to the side of ``normal`` (:func:`facet_towards`), by the
+    rounding of coordinates there. ``start`` may lie a little off that plane: its hit was rounded, or was on a patch.
     """
-    normal = facet_towards(record, triangle, outwards)
     if normal == wp.vec3d(wp.float64(0.0)):
         return start
     a = unit_vertex(record, record.faces[triangle][0])

@@ -19,6 +19,7 @@ from ldtrefl.ldt.exact.tree import TreeView
 from ldtrefl.ldt.exact.walk import CONSTANTS, FILES, SEARCH, TREE
 from ldtrefl.ldt.linear import march
 from ldtrefl.scene import shapes
+from ldtrefl.shading import surfaces
 from ldtrefl.tracing import bvh_walk
 from ldtrefl.tracing.batch import trace_batch
 from ldtrefl.tracing.hit import Hit
@@ -47,8 +48,11 @@ inline BVHPackedNodeHalf bvh_load_node(const BVHPackedNodeHalf* nodes, int index
 SOURCES = {
     "device/cpu_threads.h": (cpu_threads.CONSTANTS, ()),
     "device/vectors.h": ({}, ()),
+    "frame/backdrop.h": ({}, ("device/vectors.h",)),
+    "shading/surfaces.h": (surfaces.CONSTANTS, ("device/vectors.h",)),
     "frame/run_rays.h": (run_rays.CONSTANTS, ("device/vectors.h",)),
-    "tracing/ray_batch.h": ({}, ("device/vectors.h",)),
+    "tracing/ray_query.h": ({}, ("device/vectors.h",)),
+    "tracing/ray_batch.h": ({}, ("device/vectors.h", "tracing/ray_query.h")),
     "tracing/triangle_test.h": ({}, ("device/vectors.h",)),
     "tracing/bvh_walk.h": (bvh_walk.CONSTANTS, bvh_walk.FILES[:-1]),
     **{

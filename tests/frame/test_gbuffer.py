@@ -1,6 +1,7 @@
 """The G-buffer: surfaces of what pixels see, which pixels see reflectors, and pictures that are the caller's."""
 
 import numpy as np
+from stress_cases.inputs import camera_rays
 
 from ldtrefl.frame.pixel_order import pixels_in_blocks
 from ldtrefl.frame.visibility import draw_gbuffer
@@ -16,6 +17,20 @@ def test_positions_and_normals() -> None:
     assert len(position) > 3000
     np.testing.assert_allclose(np.linalg.norm(position, axis=1), 1.0, atol=2e-3)
     np.testing.assert_allclose(normal, position, atol=5e-3)
+
+
+def test_through_a_telephoto_lens_pixels_see_points_on_their_own_rays() -> None:
+    """Neighbouring pixels' directions differ by less than float32 tells apart."""
+    camera = Camera(eye=(0, -5e4, 1.5e4), look_at=(0, 0, 0), width=120, height=80, fov_y=0.001)
+    device_scene = flat_mirror.on_device(Scene(camera=camera, objects=(Object(shape="plane", scale=4.0),)))
+    seen = draw_gbuffer(device_scene, camera)
+    assert (seen.objects == 0).all()
+    position = seen.surfaces[0].numpy() @ np.linalg.inv(device_scene.device_from_world)[:3, :3].T
+    position += np.linalg.inv(device_scene.device_from_world)[:3, 3]
+    eye, ray = camera_rays(camera)
+    expected = eye - (eye[:, 2] / ray[:, 2])[:, None] * ray
+    pixel = np.linalg.norm(expected[1] - expected[0])
+    assert np.linalg.norm(position - expected, axis=1).max() < 1e-2 * pixel
 
 
 def test_pixels_that_see_a_reflector() -> None:

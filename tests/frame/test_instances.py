@@ -10,7 +10,6 @@ from ldtrefl.device import launch
 from ldtrefl.device.native_sources import native_body
 from ldtrefl.frame import instances
 from ldtrefl.frame.drawn_objects import DrawnObjects
-from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.instances import (
     CONSTANTS,
     EVERYWHERE,
@@ -33,6 +32,7 @@ from ldtrefl.frame.visibility import draw_gbuffer, draw_in_bands
 from ldtrefl.scene.description import Camera, Material, Object, Scene
 from ldtrefl.scene.mesh import Mesh
 from ldtrefl.world.clusters import CLUSTER, Clusters
+from tests.frame.drawing import assert_same
 from tests.frame.flat_mirror import on_device
 
 CAMERAS = {
@@ -65,13 +65,6 @@ def scene_of(kind: str) -> Scene:
         for k, place in enumerate(rng.uniform(-1, 1, (count, 3)).tolist())
     ]
     return Scene(camera=CAMERAS["outside"], objects=tuple(things))
-
-
-def assert_same(found: GBuffer, expected: GBuffer) -> None:
-    np.testing.assert_array_equal(found.objects, expected.objects)
-    np.testing.assert_array_equal(found.triangles, expected.triangles)
-    np.testing.assert_array_equal(found.view.barycentrics.numpy(), expected.view.barycentrics.numpy())
-    np.testing.assert_array_equal(found.reflector_mask, expected.reflector_mask)
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -5,11 +5,11 @@ import pytest
 
 import ldtrefl
 from ldtrefl.frame import zbuffer
-from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.visibility import draw_gbuffer
 from ldtrefl.scene import shapes
 from ldtrefl.scene.description import Camera, Object, Scene
 from ldtrefl.world import triangle_numbers
+from tests.frame.drawing import assert_same
 from tests.frame.flat_mirror import on_device
 
 
@@ -53,13 +53,6 @@ def many(count: int) -> Scene:
     ]
     camera = Camera(eye=EYE, look_at=(0, 0, 0), fov_y=70, width=80, height=60)
     return Scene(camera=camera, objects=tuple(things))
-
-
-def assert_same(found: GBuffer, expected: GBuffer) -> None:
-    np.testing.assert_array_equal(found.objects, expected.objects)
-    np.testing.assert_array_equal(found.triangles, expected.triangles)
-    np.testing.assert_array_equal(found.view.barycentrics.numpy(), expected.view.barycentrics.numpy())
-    np.testing.assert_array_equal(found.reflector_mask, expected.reflector_mask)
 
 
 @pytest.mark.parametrize("together", [1, 100, 1000])

@@ -1,11 +1,11 @@
-"""Barycentrics of a triangle: of its corners, inside it, beside it, off its plane, and where it has no area."""
+"""A triangle's normal; barycentrics: of its corners, inside it, beside it, off its plane, and where it has no area."""
 
 import numpy as np
 import pytest
 import warp as wp
 
 from ldtrefl.device import launch
-from ldtrefl.geometry.triangle import ONE_THIRD, barycentrics_at, clamped_barycentrics, plane_coordinates
+from ldtrefl.geometry.triangle import ONE_THIRD, barycentrics_at, clamped_barycentrics, facet_normal, plane_coordinates
 
 CORNERS = np.array([[1.0, 2.0, 3.0], [4.0, 2.5, 2.0], [0.5, 5.0, 3.5]])
 
@@ -33,6 +33,31 @@ def clamp_all(first: int, uv: wp.array(dtype=wp.vec2), clamped_out: wp.array(dty
     """Each thread moves one pair of barycentrics."""
     i = first + wp.tid()
     clamped_out[i] = clamped_barycentrics(uv[i][0], uv[i][1])
+
+
+@launch.kernel
+def find_normals(
+    first: int,
+    # In:
+    corners: wp.array2d(dtype=wp.vec3d),
+    # Out:
+    normal_out: wp.array(dtype=wp.vec3d),
+):
+    """Each thread finds the normal of one triangle."""
+    i = first + wp.tid()
+    normal_out[i] = facet_normal(corners[i, 0], corners[i, 1], corners[i, 2])
+
+
+def test_the_normal_of_a_slim_triangle_and_of_none() -> None:
+    """The first is a ten millionth as wide as it is long."""
+    slim = [[1, 1, 0], [2, 2, 0], [2, 2, 1e-7]]
+    line = [[0, 0, 0], [1, 2, 3], [2, 4, 6]]
+    device = launch.resolve_device(None)
+    corners = wp.array(np.array([slim, slim[::-1], line], float), dtype=wp.vec3d, device=device)
+    normal = wp.zeros(3, dtype=wp.vec3d, device=device)
+    launch.launch(find_normals, 3, [corners, normal], device)
+    aside = np.sqrt(0.5)
+    np.testing.assert_allclose(normal.numpy(), [[aside, -aside, 0], [-aside, aside, 0], [0, 0, 0]], atol=1e-15)
 
 
 def located(corners: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import ldtrefl
 from ldtrefl.scene import shapes
 from ldtrefl.scene.description import Camera, Object, Scene
 from ldtrefl.scene.layout import Layout
@@ -25,7 +26,12 @@ def test_objects_are_placed_together_as_each_alone() -> None:
     assert layout.meshes == (shapes.make("box"), shapes.make("torus")) and layout.mesh_of.tolist() == [0, 1, 0]
     for entry, matrix in zip(objects, layout.world_from_object, strict=True):
         np.testing.assert_array_equal(matrix, entry.world_from_object())
-    assert len(layout.wrong) == 0
+
+
+def test_a_size_that_is_not_allowed_is_named_by_its_object() -> None:
+    wrong = Object(shape="box", fit=1e-9, scale=1e-9)
+    with pytest.raises(ldtrefl.InputError, match=r"^object\[1\]: fit 1e-09, scale 1e-09 and the mesh"):
+        layout_of(Object(shape="torus"), wrong, wrong)
 
 
 def test_the_box_of_a_turned_object_is_that_of_its_corners() -> None:

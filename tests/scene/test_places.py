@@ -45,6 +45,14 @@ def test_the_picture_is_that_of_the_same_objects_written_out(tmp_path: Path) -> 
     assert expected.hits is not None and set(np.unique(expected.hits.object)) == {-1, 1, 2}
 
 
+def test_places_of_an_object_that_stood_somewhere_before_are_their_own() -> None:
+    entry = ldtrefl.Object(shape="box", translate=(1, 0, 0))
+    assert entry.world_from_object()[0, 3] == 1.0
+    (copy,) = standing_in(entry, np.array([[5.0, 0.0, 0.0, 2.0]]))
+    np.testing.assert_array_equal(copy.world_from_object(), [[2, 0, 0, 6], [0, 2, 0, 0], [0, 0, 2, 0], [0, 0, 0, 1]])
+    assert copy.geometry is entry.geometry
+
+
 def test_objects_without_a_name_have_none_in_their_places() -> None:
     entry = ldtrefl.Object(shape="box")
     assert [copy.name for copy in standing_in(entry, np.ones((2, 4)))] == ["", ""]

@@ -181,6 +181,7 @@ def test_benchmark_writes_what_it_promises(tmp_path: Path) -> None:
     assert {path.name for path in tmp_path.iterdir()} == plots | {"benchmark.json", "benchmark.md"}
     result = json.loads((tmp_path / "benchmark.json").read_text())
     parts = {"rays", "build", "memory", "error_against_time", "stages", "error_targets", "scaling", "paper"}
+    parts |= {"rival_frames", "start"}
     assert {"machine", "threads", "tracers", "notes"} | parts <= set(result)
     assert all(result[part] for part in parts)
     for row in result["rays"]:

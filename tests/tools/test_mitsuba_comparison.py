@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 from mitsuba_comparison import table
 from mitsuba_parts.emission_only import emission_only
-from mitsuba_parts.judge import Judgement, judgement, near_edge
+from mitsuba_parts.judge import Judgement, judgement
 from mitsuba_parts.mirror_paths import SMALL_LIFT, MirrorPaths, MitsubaPictures
-from mitsuba_parts.mitsuba_scene import mitsuba
+from picture_edges import near_edge
 
 import ldtrefl
 from ldtrefl.files.picture_reading import stored_picture
@@ -29,15 +29,6 @@ BRICKS = str(ROOT / "scenes" / "textures" / "bricks.png")
 
 CLOSE = 1e-3
 """Radiance by which pixels that see no edge may differ: float32 moves a picture of bricks by a hundredth of a texel."""
-
-
-@pytest.fixture
-def with_mitsuba() -> None:
-    """Skips the test where Mitsuba cannot be used."""
-    try:
-        mitsuba()
-    except ldtrefl.InputError as error:
-        pytest.skip(str(error))
 
 
 def of_everything() -> Scene:
@@ -66,18 +57,10 @@ def of_everything() -> Scene:
     )
 
 
-def test_a_pixel_is_near_an_edge_if_any_bounce_of_a_neighbour_meets_something_else() -> None:
-    surfaces = np.ones((2, 5, 6), np.uint32)
-    surfaces[1, 1, 4] = 2
-    expected = np.zeros((5, 6), bool)
-    expected[0:3, 3:6] = True
-    np.testing.assert_array_equal(near_edge(surfaces), expected)
-
-
 def test_pixels_are_counted_once() -> None:
     """A row of twelve: no mirror, an edge that shows what is beside it, below a facet, then those judged, of which two
-    are off and one is not finite."""
-    surfaces = np.full((2, 1, 12), 7, np.uint32)
+    are off and one is not finite. From where Mitsuba lets rays start all are brighter, and all of ours are off."""
+    surfaces = np.full((1, 12, 2), 7, np.uint32)
     surfaces[0, 0, 0] = 0
     mirrors = np.array([[0, 1, 1, 1, 2, 2, 1, 1, 1, 1, 1, 1]], np.uint32)
     below = np.zeros((1, 12), bool)
@@ -90,10 +73,8 @@ def test_pixels_are_counted_once() -> None:
     picture[0, (7, 8), 1] = 0.47
     picture[0, 9] = np.nan
     paths = MirrorPaths(surfaces, radiance, beyond, mirrors, below)
-    made = judgement("row", picture, paths, dataclasses.replace(paths, beyond=beyond + 0.02), radiance + 1.0)
-    expected = Judgement("row", 11, 2, 2, 1, 1, 5, 3, 8, 3, 3, 1.0)
-    assert dataclasses.replace(made, off_by_spawn_ray=3) == expected
-    assert made.off_by_spawn_ray == 3 and not made.passed
+    made = judgement("row", picture, paths, dataclasses.replace(paths, beyond=beyond + 0.04), radiance + 1.0)
+    assert made == Judgement("row", 11, 2, 2, 1, 1, 5, 3, 8, 3, 8, 1.0) and not made.passed
 
 
 @pytest.mark.parametrize(
@@ -136,7 +117,7 @@ def test_mitsuba_sees_the_same_scene() -> None:
     paths = pictures.followed(1, SMALL_LIFT)
     ours = ldtrefl.render(scene, "bvh", max_bounces=1)
     clear = ~near_edge(paths.surfaces) & ~paths.leaves_below
-    assert len(np.unique(paths.surfaces[0])) == len(scene.objects) + 2  # a mesh of two parts, and the environment
+    assert len(np.unique(paths.surfaces[..., 0])) == len(scene.objects) + 2  # a mesh of two parts, and the environment
     assert clear.mean() > 0.8
     np.testing.assert_array_equal(ours.reflector_mask[clear], paths.mirrors[clear] > 0)
     difference = np.abs(ours.image - paths.radiance - paths.beyond).max(axis=-1)

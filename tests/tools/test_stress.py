@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from stress import CASES, load
+from stress_cases import bounds
 from stress_cases.files import MEMORY, SECONDS, Case, fault_of_picture, fault_of_process
 from stress_cases.inputs import rays_about
 from stress_cases.judge import judge
@@ -18,6 +19,7 @@ from stress_cases.pictures import Held, judge_frame, reflected_hits, shows_enoug
 from stress_cases.truth import Truth
 
 import ldtrefl
+from ldtrefl.ldt.options import Quality
 from ldtrefl.scene import shapes
 
 FORKING = ("files", "kills", "cache_files")
@@ -31,6 +33,12 @@ def test_case_keeps_its_limits(name: str) -> None:
     beyond = [f"{o.what}, {o.by}: {o}" for o in outcomes if not o.passed]
     assert outcomes and not beyond, beyond[0]
     assert sum(o.non_finite for o in outcomes) == 0
+
+
+@pytest.mark.parametrize("quality", ["balanced", "fast"])
+def test_patches_stand_for_the_dense_mesh_of_the_bounds(quality: Quality) -> None:
+    mesh = shapes.make("sphere", bounds.DENSE)
+    assert ldtrefl.peel(mesh.vertices, mesh.faces, bounds.COARSE, quality=quality).tree.patches
 
 
 def test_files_and_kills_keep_their_limits() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import warp as wp
+from stress_cases.paths import Surfaces
 
 import ldtrefl
 from ldtrefl.device import launch
@@ -103,23 +104,6 @@ def test_of_objects_in_one_place_the_first_is_met(bounds: bool) -> None:
     assert hits.object.numpy().tolist() == np.where(source == 0, 1, 0).tolist()
 
 
-def brute_force(mesh: ldtrefl.Mesh, origins: np.ndarray, directions: np.ndarray, own: np.ndarray) -> np.ndarray:
-    """(n,) distance in float64 to the first triangle of a mesh but its own, by Moeller and Trumbore."""
-    a, b, c = mesh.vertices[mesh.faces].transpose(1, 0, 2)
-    nearest = np.full(len(origins), np.inf)
-    for i, (origin, direction) in enumerate(zip(origins, directions, strict=True)):
-        p = np.cross(direction, c - a)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            inverse = 1.0 / ((b - a) * p).sum(axis=1)
-            u = ((origin - a) * p).sum(axis=1) * inverse
-            q = np.cross(origin - a, b - a)
-            v, t = (q @ direction) * inverse, ((c - a) * q).sum(axis=1) * inverse
-        is_met = (u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0)
-        is_met[own[i]] = False
-        nearest[i] = t[is_met].min(initial=np.inf)
-    return nearest
-
-
 @pytest.mark.parametrize("tracer", ["bvh", "exact", "linear"])
 @pytest.mark.parametrize("size", [1e-4, 1.0, 1e4])
 def test_rays_meet_the_object_that_they_leave_where_brute_force_says(tracer: str, size: float) -> None:
@@ -128,18 +112,17 @@ def test_rays_meet_the_object_that_they_leave_where_brute_force_says(tracer: str
     own = rng.integers(0, len(mesh.faces), count)
     corners = mesh.vertices[mesh.faces[own]]
     points = (rng.dirichlet((2, 2, 2), count)[:, :, None] * corners).sum(axis=1)
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     ways = rng.normal(size=(count, 3))
     ways /= np.linalg.norm(ways, axis=1, keepdims=True)
-    expected = brute_force(mesh, points, ways, own)
-    assert 300 < np.isfinite(expected).sum() < 580
-
     camera = Camera(eye=(0, -9 * size, 0), look_at=(0, 0, 0), width=4, height=4)
     ring = Object(mesh=mesh, scale=size, translate=(2 * size, 0, 0), material=Material(mirror=1.0))
     far = Object(shape="box", scale=0.1 * size, translate=(-40 * size, 0, 0))
-    scene = DeviceScene(Scene(camera=camera, objects=(ring, far)), launch.resolve_device(None))
-    rays = rays_of(scene, points * size + [2 * size, 0, 0], ways, np.zeros(count))
+    given, starts = Scene(camera=camera, objects=(ring, far)), points * size + [2 * size, 0, 0]
+    expected = Surfaces(given).first_hits(starts, ways, own)[0] / size
+    assert 300 < np.isfinite(expected).sum() < 580
+
+    scene = DeviceScene(given, launch.resolve_device(None))
+    rays = rays_of(scene, starts, ways, np.zeros(count))
     rays.source_triangle = wp.array(own.astype(np.int32), dtype=wp.int32, device=scene.device)
     rays.may_return.fill_(1)
     options = MapOptions(tracer, "balanced", "texel", 8, 256)

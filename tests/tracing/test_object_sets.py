@@ -11,8 +11,6 @@ from ldtrefl.tracing.object_sets import (
     all_sets,
     entries,
     is_listed,
-    lowest_bit,
-    lowest_bit_of_64,
     object_listed,
     objects_listed,
     rays_of,
@@ -67,29 +65,6 @@ def test_lists_tell_runs_and_rays_apart() -> None:
     assert [set(objects[runs == run].tolist()) for run in range(3)] == by_run
     runs, objects = entries(ends)
     assert [set(objects[runs == run].tolist()) for run in range(2)] == [by_run[0], by_run[2]]
-
-
-@launch.kernel
-def find_lowest_bits(
-    first: int,
-    # In:
-    words: wp.array(dtype=wp.uint64),
-    # Out:
-    lowest_out: wp.array2d(dtype=wp.int32),
-):
-    """Find the lowest bit of one word, and of its lower half."""
-    i = first + wp.tid()
-    lowest_out[i, 0] = lowest_bit_of_64(words[i])
-    lowest_out[i, 1] = lowest_bit(wp.uint32(words[i] & wp.uint64(0xFFFFFFFF)))
-
-
-def test_the_lowest_bit_of_a_word() -> None:
-    device, bits = launch.resolve_device(None), np.arange(64)
-    words = (np.uint64(1) << bits.astype(np.uint64)) | (np.uint64(1) << np.uint64(63))
-    found = wp.empty((64, 2), dtype=wp.int32, device=device)
-    launch.launch(find_lowest_bits, 64, [wp.array(words, dtype=wp.uint64, device=device), found], device)
-    np.testing.assert_array_equal(found.numpy()[:, 0], bits)
-    np.testing.assert_array_equal(found.numpy()[:32, 1], bits[:32])
 
 
 def test_runs_are_counted_up() -> None:

@@ -32,16 +32,16 @@ def test_equal_cameras_have_the_same_bits() -> None:
 
 def test_the_height_of_the_image_is_the_field_of_view() -> None:
     view = camera_view(CAMERA, WORLD, whole_image(CAMERA))
-    top, bottom = (np.array(camera_ray(view, 30.0, y)) for y in (0.0, 40.0))
+    top, bottom = (np.array(camera_ray(view, wp.float64(30.0), wp.float64(y))) for y in (0.0, 40.0))
     cosine = top @ bottom / np.linalg.norm(top) / np.linalg.norm(bottom)
     assert np.degrees(np.arccos(cosine)) == pytest.approx(50.0, abs=1e-3)
-    np.testing.assert_allclose(camera_ray(view, 30.0, 20.0), camera_axes(CAMERA)[2], atol=1e-6)
+    np.testing.assert_allclose(camera_ray(view, wp.float64(30.0), wp.float64(20.0)), camera_axes(CAMERA)[2], atol=1e-6)
 
 
 def test_points_on_a_ray_are_seen_at_its_pixel_and_depth() -> None:
     view, projection = camera_view(CAMERA, WORLD, whole_image(CAMERA)), pixels_from_world(CAMERA)
     for x, y, depth in ((0.5, 0.5, 3.0), (59.5, 10.5, 0.1), (20.25, 39.75, 1e4)):
-        point = np.array(CAMERA.eye) + depth * np.array(camera_ray(view, x, y), float)
+        point = np.array(CAMERA.eye) + depth * np.array(camera_ray(view, wp.float64(x), wp.float64(y)), float)
         found = projection @ [*point, 1.0]
         np.testing.assert_allclose(found[:2] / found[2], (x, y), atol=1e-3)
         assert found[2] == pytest.approx(depth, rel=1e-5)
@@ -51,7 +51,9 @@ def test_a_band_has_the_rays_of_the_whole_image() -> None:
     whole, band = camera_view(CAMERA, WORLD, whole_image(CAMERA)), camera_view(CAMERA, WORLD, Band(16, 8))
     assert whole_image(CAMERA) == Band(0, 40)
     for x, y in ((0.5, 0.5), (33.5, 7.5)):
-        assert tuple(camera_ray(band, x, y)) == tuple(camera_ray(whole, x, y + 16.0))
+        assert tuple(camera_ray(band, wp.float64(x), wp.float64(y))) == tuple(
+            camera_ray(whole, wp.float64(x), wp.float64(y + 16.0))
+        )
 
 
 def test_the_eye_is_moved_to_device_space() -> None:

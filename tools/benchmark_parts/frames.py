@@ -18,6 +18,7 @@ from ldtrefl.renderer import Renderer
 from ldtrefl.scene.description import Scene
 
 from .common import ROOT, SKIPS_BUT_FRAMES, knot_scene
+from .our_frames import median_stages
 from .paper import PAPER_TABLE_2
 from .result import ErrorPoint, ErrorTarget
 
@@ -77,15 +78,13 @@ def frame_stages(quick: bool, rounds: int) -> dict[str, dict[str, float]]:
                 # A camera that moves: the maps stay, everything else is done again.
                 camera = dataclasses.replace(scene.camera, eye=(0.001 * len(first) - 0.5, -4.5, 0.8))
                 moved.append(renderer.render(camera=camera).stats.seconds)
-            stages[f"{method}, {threads} threads, first frame"] = _median_stages(first[1:])
-            stages[f"{method}, {threads} threads, camera moved"] = _median_stages(moved[1:])
+            stages[f"{method}, {threads} threads, first frame"] = _stages_and_total(first[1:])
+            stages[f"{method}, {threads} threads, camera moved"] = _stages_and_total(moved[1:])
     return stages
 
 
-def _median_stages(frames: list[dict[str, float]]) -> dict[str, float]:
-    names = list(dict.fromkeys(name for frame in frames for name in frame))
-    rows = {name: 1000 * statistics.median(frame.get(name, 0.0) for frame in frames) for name in names}
-    return rows | {"total": 1000 * statistics.median(sum(frame.values()) for frame in frames)}
+def _stages_and_total(frames: list[dict[str, float]]) -> dict[str, float]:
+    return median_stages(frames) | {"total": 1000 * statistics.median(sum(frame.values()) for frame in frames)}
 
 
 def error_targets(quick: bool, rounds: int) -> list[ErrorTarget]:

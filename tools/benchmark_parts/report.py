@@ -11,6 +11,7 @@ from timing import Summary
 
 from ldtrefl.files.atomic_write import written_whole
 
+from .frame_tables import frames_before_tables, rival_frames_tables, start_table
 from .models import KNOTS
 from .result import ErrorPoint, Result
 from .tables import build_tables, memory_table, number, rays_tables, table
@@ -106,6 +107,9 @@ def reading(result: Result) -> str:
         ("build", build_tables),
         ("memory", memory_table),
         ("stages", _frame_tables),
+        ("rival_frames", rival_frames_tables),
+        ("frames_before", frames_before_tables),
+        ("start", start_table),
         ("scaling", _scaling_line),
         ("paper", _paper_tables),
     ):

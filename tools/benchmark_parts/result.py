@@ -130,6 +130,37 @@ class PaperTables(TypedDict):
     table_2: dict[str, PaperScene]
 
 
+class FrameTime(TypedDict):
+    """Whole frames of a scene, the camera moved before each."""
+
+    milliseconds: Summary
+    first: float
+    """Of the first frame, with all that is built, loaded and compiled for it."""
+    stages: dict[str, float]
+    """Medians, where the stages are known."""
+
+
+class FrameRow(TypedDict):
+    """Whole frames of one scene, made in turn."""
+
+    scene: str
+    triangles: int
+    size: tuple[int, int]
+    bounces: int
+    threads: int
+    makers: dict[str, FrameTime]
+    """By who makes them; ``ldt before`` is ``ldt`` of another checkout."""
+    unlike: float | None
+    """Percent of pixels by which Mitsuba's picture with our lights is off from that of ``bvh``."""
+
+
+class StartRow(TypedDict):
+    """Milliseconds of ``ldtrefl render scenes/teapot.toml``, from process to picture, by checkout."""
+
+    what: str
+    checkouts: dict[str, Summary]
+
+
 class Result(TypedDict, total=False):
     """Everything. The keys of parts that were not run are missing."""
 
@@ -149,3 +180,8 @@ class Result(TypedDict, total=False):
     scaling: dict[str, float]
     """Time with one thread over that with two, by work."""
     paper: PaperTables
+    rival_frames: list[FrameRow]
+    """Beside Mitsuba's."""
+    frames_before: list[FrameRow]
+    """Beside those of another checkout."""
+    start: list[StartRow]

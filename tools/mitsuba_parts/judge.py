@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from picture_edges import around, near_edge
 
 from .mirror_paths import MirrorPaths
 
@@ -49,24 +48,6 @@ class Judgement:
         """Whether the picture is Mitsuba's."""
         few = self.off <= MOST_OFF * self.judged and self.unlike_all_around <= MOST_OFF * self.mask
         return self.judged > 0 and few
-
-
-def around(picture: np.ndarray) -> Iterator[np.ndarray]:
-    """An (h, w, ...) picture nine times, each pixel in the place of one of the 3 x 3 around it; the border repeats."""
-    height, width = picture.shape[:2]
-    padded = np.pad(picture, ((1, 1), (1, 1)) + ((0, 0),) * (picture.ndim - 2), mode="edge")
-    for row, column in itertools.product(range(3), repeat=2):
-        yield padded[row : row + height, column : column + width]
-
-
-def near_edge(surfaces: np.ndarray) -> np.ndarray:
-    """(h, w) bool: the paths of the 3 x 3 pixels around do not all meet the same surfaces in the same order.
-
-    Args:
-        surfaces: (n, h, w) numbers of the surfaces met.
-    """
-    met = np.moveaxis(surfaces, 0, -1)
-    return np.any([(moved != met).any(axis=-1) for moved in around(met)], axis=0)
 
 
 def is_off(picture: np.ndarray, truth: np.ndarray) -> np.ndarray:

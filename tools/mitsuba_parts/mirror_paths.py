@@ -30,7 +30,7 @@ class MirrorPaths:
     """The paths of all pixels of a picture."""
 
     surfaces: np.ndarray
-    """(bounces + 1, h, w) uint32: the number of the surface that each meets with each of its rays; 0 for none."""
+    """(h, w, bounces + 1) uint32: the number of the surface that each meets with each of its rays; 0 for none."""
     radiance: np.ndarray
     """(h, w, 3) float32 that they bring, the limit of bounces aside."""
     beyond: np.ndarray
@@ -87,7 +87,7 @@ class MitsubaPictures:
         on_miss.wi = -ray.d
         beyond = dr.select(active, throughput * scene.environment().eval(on_miss), 0.0)
         pictures = [self._picture(values) for values in (radiance, beyond, mirrors, leaves_below)]
-        return MirrorPaths(np.stack(surfaces), *pictures)
+        return MirrorPaths(np.stack(surfaces, axis=-1), *pictures)
 
     def _camera_rays(self) -> Any:
         mi, (width, height) = self._mi, self._size

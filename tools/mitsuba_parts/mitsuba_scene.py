@@ -20,6 +20,9 @@ from ldtrefl.scene.description import Camera, Environment, Object, Scene
 from ldtrefl.world.camera import unit_up
 
 VARIANT = "llvm_ad_rgb"
+SCALAR_VARIANT = "scalar_rgb"
+TWO_SIDED = "two_sided_area"
+"""The emitter that is made here."""
 ENVIRONMENT_ROWS = 1025
 """Of the environment's picture: linear interpolation of the cosine between them is wrong by 1e-6."""
 ENVIRONMENT_COLUMNS = 8
@@ -27,19 +30,25 @@ NEAR_CLIP = 1e-6
 """Of the camera's depth range, which nothing is to be cut off by; of the distance from ``eye`` to ``look_at``."""
 
 
-@functools.cache
-def mitsuba() -> ModuleType:
-    """Mitsuba, ready to trace many rays at once.
+def mitsuba(variant: str = VARIANT) -> ModuleType:
+    """Mitsuba, its names those of a variant; the usual one is ready to trace many rays at once.
 
     Raises:
         InputError: it cannot be used here.
     """
+    mi = _loaded(variant)
+    mi.set_variant(variant)
+    return mi
+
+
+@functools.cache
+def _loaded(variant: str) -> ModuleType:
     try:
         mi = importlib.import_module("mitsuba")
-        mi.set_variant(VARIANT)
+        mi.set_variant(variant)
         dr = importlib.import_module("drjit")
         dr.eval(mi.Float(0.0) + 1.0)
-        mi.register_emitter("two_sided_area", _two_sided_area(mi, dr))
+        mi.register_emitter(TWO_SIDED, _two_sided_area(mi, dr))
     except Exception as error:
         fault = f"{type(error).__name__}: {error}"
         raise InputError(
@@ -70,10 +79,10 @@ def _two_sided_area(mi: Any, dr: Any) -> Any:
     return TwoSidedArea
 
 
-def mitsuba_scene(scene: Scene) -> Any:
-    """Mitsuba's scene: a mesh for each part of each object."""
-    mi = mitsuba()
-    meshes = [mesh for entry in scene.objects for mesh in _meshes_of(mi, entry)]
+def mitsuba_scene(scene: Scene, variant: str = VARIANT, emitter: str = TWO_SIDED) -> Any:
+    """Mitsuba's scene: a mesh for each part of each object, which ``emitter`` lets shine."""
+    mi = mitsuba(variant)
+    meshes = [mesh for entry in scene.objects for mesh in _meshes_of(mi, entry, emitter)]
     named = {f"mesh_{i}": mesh for i, mesh in enumerate(meshes)}
     camera, environment = _camera(mi, scene.camera), _environment(mi, scene.environment, unit_up(scene.camera))
     # Mitsuba would join meshes into one, which has then a single number.
@@ -89,9 +98,7 @@ def _camera(mi: Any, camera: Camera) -> dict[str, object]:
         "fov_axis": "y",
         "near_clip": NEAR_CLIP * distance,
         "far_clip": distance / NEAR_CLIP,
-        "to_world": mi.ScalarTransform4f().look_at(
-            origin=list(camera.eye), target=list(camera.look_at), up=list(camera.up)
-        ),
+        "to_world": camera_place(mi, camera),
         "sampler": {"type": "stratified", "sample_count": 1, "jitter": False},
         "film": {
             "type": "hdrfilm",
@@ -102,6 +109,11 @@ def _camera(mi: Any, camera: Camera) -> dict[str, object]:
             "component_format": "float32",
         },
     }
+
+
+def camera_place(mi: ModuleType, camera: Camera) -> Any:
+    """Where a camera stands and looks, as Mitsuba has it."""
+    return mi.ScalarTransform4f().look_at(origin=list(camera.eye), target=list(camera.look_at), up=list(camera.up))
 
 
 def _environment(mi: Any, environment: Environment, up: np.ndarray) -> dict[str, object]:
@@ -117,7 +129,7 @@ def _environment(mi: Any, environment: Environment, up: np.ndarray) -> dict[str,
     return {"type": "envmap", "bitmap": mi.Bitmap(picture), "to_world": mi.ScalarTransform4f(to_world)}
 
 
-def _meshes_of(mi: Any, entry: Object) -> list[Any]:
+def _meshes_of(mi: Any, entry: Object, emitter: str) -> list[Any]:
     """An object's parts."""
     mesh, material = entry.geometry, entry.material
     place = entry.world_from_object()
@@ -132,23 +144,23 @@ def _meshes_of(mi: Any, entry: Object) -> list[Any]:
         picture = part.texture if entry.texture is None else entry.texture
         color = np.multiply(material.albedo, part.color)
         properties["emitter"] = mi.load_dict(
-            {"type": "two_sided_area", "radiance": _radiance(mi, color, np.asarray(material.emission), picture)}
+            {"type": emitter, "radiance": _radiance(mi, color, np.asarray(material.emission), picture)}
         )
         made.append(_mesh(mi, vertices, mesh.faces[first:end], normals, mesh.uvs, properties))
     return made
 
 
 def _bsdf(entry: Object) -> dict[str, object]:
-    if not entry.is_reflector:
-        return {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.0}}
+    """A mirror. What mirrors nothing is a black one: at a diffuse surface Mitsuba would look for lights."""
     mirror = {"type": "rgb", "value": list(entry.material.mirror)}
     return {"type": "twosided", "bsdf": {"type": "conductor", "material": "none", "specular_reflectance": mirror}}
 
 
 def _radiance(mi: Any, color: np.ndarray, emission: np.ndarray, picture: StoredPicture | None) -> dict[str, object]:
-    """``emission + color * picture`` as a texture: a constant is one texel."""
-    pixels = np.ones((1, 1, 3), np.float32) if picture is None else _linear(mi, picture)
-    values = (emission + color * pixels).astype(np.float32)
+    """``emission + color * picture``, a texture where there is a picture."""
+    if picture is None:
+        return {"type": "rgb", "value": (emission + color).tolist()}
+    values = (emission + color * _linear(mi, picture)).astype(np.float32)
     texture = {"type": "bitmap", "data": mi.TensorXf(values), "raw": True}
     return {**texture, "filter_type": "bilinear", "wrap_mode": "repeat"}
 

@@ -32,18 +32,20 @@ SMALL: dict[str, Params] = {
     "torus_knot": {"segments": [24, 6]},
 }
 SMALL |= {"bowl": {"segments": [12, 4]}, "genus3": {"grid": 16}, "gyroid": {"grid": 16}, "teapot": {"segments": 2}}
-DENSE: Params = {"segments": [1600, 100]}
-"""Parameters of a torus knot that is so fine that patches stand for its triangles."""
+DENSE: Params = {"segments": [260, 120]}
+"""Parameters of a sphere that is so fine that patches stand for its triangles in maps of ``COARSE`` texels."""
+COARSE = 64
+"""Texels along a side of most maps: few, so that so few triangles are enough for patches, as this mode is slow."""
 
 OPTIONS: list[tuple[str, dict[str, Any]]] = [
     ("ldt", {}),
-    ("ldt", {"skip": "none"}),
-    ("ldt", {"quality": "exact", "max_bounces": 3}),
-    ("ldt", {"quality": "fast"}),
+    ("ldt", {"skip": "none", "resolution": COARSE}),
+    ("ldt", {"quality": "exact", "max_bounces": 3, "resolution": COARSE}),
+    ("ldt", {"quality": "fast", "resolution": COARSE}),
     ("ldt", {"search": "linear", "resolution": 32, "linear_steps": 64, "max_bounces": 2}),
     ("ldt", {"error": 1.0}),
-    ("ldt", {"cull": "flat"}),
-    *[("ldt", {"skip": [name for name in skip_names() if name != off]}) for off in skip_names()],
+    ("ldt", {"cull": "flat", "resolution": COARSE}),
+    *[("ldt", {"skip": [name for name in skip_names() if name != off], "resolution": COARSE}) for off in skip_names()],
     ("bvh", {"max_bounces": 2}),
     ("envmap", {"resolution": 16}),
 ]
@@ -94,7 +96,7 @@ def scenes(step: int, folder: Path) -> list[Scene]:
     ldtrefl.save_image(texture, np.random.default_rng(0).random((5, 7, 3)).astype(np.float32))
     ldtrefl.save_image(sky, np.random.default_rng(1).random((6, 12, 3)).astype(np.float32))
     things = [thing for shape in shapes.names() for thing in variants(shape, SMALL.get(shape, {}), texture)][::step]
-    things += list(variants("torus_knot", DENSE, texture))[:: max(step, 3)]
+    things += list(variants("sphere", DENSE, texture))[:: max(step, 3)]
     far = [[1e5, 0, 0], [1e5, 1, 0], [1e5, 0, 1]]
     outlier = ldtrefl.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]] * 40 + far, np.arange(123).reshape(-1, 3))
     things.append({"mesh": outlier, "smooth": False})

@@ -35,45 +35,60 @@ HALVINGS = 60
 """Of the turn of a normal that is bent: more than a float64 has bits."""
 
 
+@wp.struct
+class LeavingRays:
+    """Rays, and the triangles that they leave."""
+
+    origin: wp.array(dtype=wp.vec3d)  # in the world
+    direction: wp.array(dtype=wp.vec3d)  # unit
+    left: wp.array(dtype=wp.int32)  # the triangle that the ray leaves; -1 for none
+    least: wp.array(dtype=wp.float64)  # t of the nearest hit that counts
+
+
+@wp.struct
+class Triangles:
+    """The triangles of all objects in the world, one object after another."""
+
+    corner: wp.array(dtype=wp.vec3d)
+    edge_u: wp.array(dtype=wp.vec3d)  # from that corner
+    edge_v: wp.array(dtype=wp.vec3d)
+    begin: wp.array(dtype=wp.int32)  # the first triangle of each object; then the number of triangles
+    centre: wp.array(dtype=wp.vec3d)  # of a sphere about each object
+    radius: wp.array(dtype=wp.float64)
+
+
 @launch.kernel
 def find_nearest_triangles(
     first: int,
     # In:
-    origins: wp.array(dtype=wp.vec3d),
-    directions: wp.array(dtype=wp.vec3d),
-    left: wp.array(dtype=wp.int32),  # the triangle that the ray leaves; -1 for none
-    least: wp.array(dtype=wp.float64),  # t of the nearest hit that counts
-    corner: wp.array(dtype=wp.vec3d),
-    edge_u: wp.array(dtype=wp.vec3d),
-    edge_v: wp.array(dtype=wp.vec3d),
-    begin: wp.array(dtype=wp.int32),  # triangle of each object; then the number of triangles
-    centre: wp.array(dtype=wp.vec3d),  # of a sphere about each object
-    radius: wp.array(dtype=wp.float64),
+    rays: LeavingRays,
+    triangles: Triangles,
     # Out:
     t_out: wp.array(dtype=wp.float64),
     triangle_out: wp.array(dtype=wp.int32),
 ):
     """Test one ray against every triangle."""
     i = first + wp.tid()
-    o, d = origins[i], directions[i]
+    o, d = rays.origin[i], rays.direction[i]
     nearest = wp.float64(wp.inf)
     found = int(-1)
     zero, one = wp.float64(0.0), wp.float64(1.0)
-    for k in range(centre.shape[0]):
-        offset = centre[k] - o
+    for k in range(triangles.centre.shape[0]):
+        offset = triangles.centre[k] - o
         aside = offset - wp.dot(offset, d) * d
-        if wp.dot(aside, aside) <= radius[k] * radius[k]:
-            for j in range(begin[k], begin[k + 1]):
-                p = wp.cross(d, edge_v[j])
-                determinant = wp.dot(p, edge_u[j])
-                if determinant != zero and j != left[i]:
-                    s = o - corner[j]
+        if wp.dot(aside, aside) <= triangles.radius[k] * triangles.radius[k]:
+            for j in range(triangles.begin[k], triangles.begin[k + 1]):
+                edge_u, edge_v = triangles.edge_u[j], triangles.edge_v[j]
+                p = wp.cross(d, edge_v)
+                determinant = wp.dot(p, edge_u)
+                if determinant != zero and j != rays.left[i]:
+                    s = o - triangles.corner[j]
                     u = wp.dot(s, p) / determinant
                     if u >= zero and u <= one:
-                        q = wp.cross(s, edge_u[j])
+                        q = wp.cross(s, edge_u)
                         v = wp.dot(d, q) / determinant
-                        t = wp.dot(edge_v[j], q) / determinant
-                        if v >= zero and u + v <= one and t > least[i] and t < nearest:
+                        t = wp.dot(edge_v, q) / determinant
+                        if v >= zero and u + v <= one and t > rays.least[i] and t < nearest:
                             nearest = t
                             found = j
     t_out[i] = nearest
@@ -107,7 +122,6 @@ class Surfaces:
     """The objects of a scene in the world, in float64."""
 
     def __init__(self, scene: ldtrefl.Scene) -> None:
-        self.scene = scene
         meshes = [entry.geometry for entry in scene.objects]
         places = [entry.world_from_object() for entry in scene.objects]
         worlds = [mesh.vertices @ m[:3, :3].T + m[:3, 3] for mesh, m in zip(meshes, places, strict=True)]
@@ -118,19 +132,21 @@ class Surfaces:
         low, high = (np.array([extreme(world, axis=0) for world in worlds]) for extreme in (np.min, np.max))
         self.radius = 0.5 * np.linalg.norm(high - low, axis=1)
         a, b, c = self.corners.transpose(1, 0, 2)
-        self._spheres = 0.5 * (low + high), (1.0 + SPHERE_SLACK) * self.radius
-        self._inputs = [wp.array(x, dtype=wp.vec3d, device="cpu") for x in (a, b - a, c - a)]
-        self._inputs.append(wp.array(self.begin, dtype=wp.int32, device="cpu"))
-        self._inputs.append(wp.array(self._spheres[0], dtype=wp.vec3d, device="cpu"))
-        self._inputs.append(wp.array(self._spheres[1], dtype=wp.float64, device="cpu"))
+        self._triangles = Triangles()
+        self._triangles.corner, self._triangles.edge_u, self._triangles.edge_v = map(_points, (a, b - a, c - a))
+        self._triangles.begin = wp.array(self.begin, dtype=wp.int32, device="cpu")
+        self._triangles.centre = _points(0.5 * (low + high))
+        self._triangles.radius = wp.array((1.0 + SPHERE_SLACK) * self.radius, dtype=wp.float64, device="cpu")
 
     def first_hits(self, o: np.ndarray, d: np.ndarray, left: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(n,) t and triangles, +inf and -1 on a miss, of rays of unit directions that leave the triangles ``left``."""
-        t, triangle = wp.empty(len(o), dtype=wp.float64, device="cpu"), wp.empty(len(o), dtype=wp.int32, device="cpu")
+        rays = LeavingRays()
+        rays.origin, rays.direction = _points(o), _points(d)
+        rays.left = wp.array(left, dtype=wp.int32, device="cpu")
         least = np.where(left >= 0, TOUCHING * self.radius[self.owner[left]], 0.0)
-        rays = [wp.array(np.ascontiguousarray(x), dtype=wp.vec3d, device="cpu") for x in (o, d)]
-        rays += [wp.array(left, dtype=wp.int32, device="cpu"), wp.array(least, dtype=wp.float64, device="cpu")]
-        launch.launch(find_nearest_triangles, len(o), [*rays, *self._inputs, t, triangle], t.device)
+        rays.least = wp.array(least, dtype=wp.float64, device="cpu")
+        t, triangle = wp.empty(len(o), dtype=wp.float64, device="cpu"), wp.empty(len(o), dtype=wp.int32, device="cpu")
+        launch.launch(find_nearest_triangles, len(o), [rays, self._triangles, t, triangle], t.device)
         return t.numpy(), triangle.numpy().astype(int)
 
     def facet_and_normal(self, triangles: np.ndarray, points: np.ndarray, view: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -217,6 +233,10 @@ def _turned(normals: np.ndarray, facets: np.ndarray, turn: np.ndarray) -> np.nda
     shares = (np.sin((1.0 - turn) * angle) / sine)[:, None], (np.sin(turn * angle) / sine)[:, None]
     mixed = np.where((angle > 0.0)[:, None], shares[0] * normals + shares[1] * facets, facets)
     return mixed / np.linalg.norm(mixed, axis=1, keepdims=True)
+
+
+def _points(values: np.ndarray) -> wp.array:
+    return wp.array(np.ascontiguousarray(values), dtype=wp.vec3d, device="cpu")
 
 
 def _world_normals(entry: Object) -> np.ndarray:

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from picture_edges import near_edge
 
 import ldtrefl
 from ldtrefl.scene import shapes
@@ -72,7 +73,8 @@ def ball(material: Material, x: float = 0.0) -> Things:
 
 def lamp() -> Things:
     """Something to be seen in mirrors."""
-    return [{"shape": "box", "scale": 0.3, "translate": (-1.8, 0.2, 0.8), "material": ORANGE, "smooth": False}]
+    thing = {"name": "lamp", "shape": "box", "scale": 0.3, "translate": (-1.8, 0.2, 0.8), "smooth": False}
+    return [thing | {"material": ORANGE}]
 
 
 def bowl_with_ball() -> Things:
@@ -136,8 +138,4 @@ def near_edges(scene: Scene, paths: Paths) -> np.ndarray:
     not smooth."""
     is_flat = np.array([not entry.smooth for entry in scene.objects] + [False])
     met = np.stack([e.object + len(is_flat) * np.where(is_flat[e.object], e.triangle, 0) for e in paths.ends], axis=-1)
-    height, width = met.shape[:2]
-    wide = np.pad(met, ((1, 1), (1, 1), (0, 0)), mode="edge")
-    shifts = [wide[y : y + height, x : x + width] for y in range(3) for x in range(3)]
-    near: np.ndarray = np.any([(other != met).any(axis=-1) for other in shifts], axis=0)
-    return near
+    return near_edge(met)

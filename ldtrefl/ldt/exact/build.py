@@ -20,6 +20,7 @@ from ldtrefl.ldt.exact.binary_tree import (
     split_cells,
     split_groups,
 )
+from ldtrefl.ldt.exact.patches import PATCH_MARGIN
 from ldtrefl.ldt.exact.record_choice import PatchRecords, choose_records
 from ldtrefl.ldt.exact.records import Records
 from ldtrefl.ldt.exact.tree import Tree
@@ -31,6 +32,9 @@ BYTES_PER_RECORD = 80
 """What a record takes in the tree and while that is built, at most."""
 MOST_RECORDS = 100_000_000
 """Records of a tree: twice the number of a block's first row fits in an int32."""
+
+HORIZON = 1.0 / 3.0
+"""Texels past a doubtful hit from which a search goes on."""
 
 
 KERNELS = (write_nodes, split_groups, measure_cells, number_cells, split_cells, gather_nodes, sort_by_cell)
@@ -70,8 +74,9 @@ def _tree_with_patches(geometry: DeviceMesh, chosen: PatchRecords) -> Tree:
     records.unit_offset = wp.vec3(*(-np.array(frame.offset) / frame.scale))
     tree = _tree_over(records, chosen.numbers.shape[0], geometry)
     view = tree.view
-    view.front, view.horizon = float(chosen.front), chosen.horizon / frame.scale
-    view.half_patch = chosen.half_patch / frame.scale
+    view.front = float(chosen.front)
+    view.half_patch = (0.5 + float(PATCH_MARGIN)) / frame.scale
+    view.horizon = HORIZON / frame.scale
     return tree
 
 

@@ -12,12 +12,17 @@ struct RayPackets : SingleRays {
         float nearest[LANES];
     };
 
+    // The lanes whose bits are set.
+    SHARED EightFlags lanes_of(int word) {
+        float flags[LANES];
+        for (int lane = 0; lane < LANES; ++lane) flags[lane] = (float)(word >> lane & 1);
+        return load(flags) > eight(0.0f);
+    }
+
     // Fill in a packet of the rays whose bits are set; false if they do not go into one octant, or are far apart.
     SHARED bool make_packet(Packet& packet, const Rays& rays, int live) {
         const int lead = lowest_bit(live);
-        float flags[LANES];
-        for (int lane = 0; lane < LANES; ++lane) flags[lane] = (float)(live >> lane & 1);
-        const EightFlags takes_part = load(flags) > eight(0.0f);
+        const EightFlags takes_part = lanes_of(live);
         for (int k = 0; k < 3; ++k) {
             // Those that take no part are given the numbers of the first that does.
             const Eight inverse = chosen(takes_part, load(rays.inverse[k]), eight(rays.inverse[k][lead]));

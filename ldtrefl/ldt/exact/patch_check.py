@@ -67,7 +67,7 @@ class Neighbour:
 
     is_there: int  # NONE, GOES_ON or TURNS_AWAY
     height: float  # over the patch's plane, cells
-    is_beside: bool  # in the same map
+    is_beside: bool  # it is there, in the same map
 
 
 @wp.func
@@ -188,8 +188,7 @@ def compare_with_neighbours(
         behind = neighbour_towards(maps, axis, texel, -step, plane)
         doubtful = doubtful or ahead.is_there != GOES_ON or behind.is_there != GOES_ON
         # A patch of another map lies elsewhere in its texel: the neighbour on the other side alone tells the turn.
-        weight_ahead = wp.where(ahead.is_there != NONE and ahead.is_beside, 1.0, 0.0)
-        weight_behind = wp.where(behind.is_there != NONE and behind.is_beside, 1.0, 0.0)
+        weight_ahead, weight_behind = wp.where(ahead.is_beside, 1.0, 0.0), wp.where(behind.is_beside, 1.0, 0.0)
         weights = wp.max(weight_ahead + weight_behind, 1.0)
         turn = 2.0 * (weight_ahead * ahead.height + weight_behind * behind.height) / weights
         rise += RISE_PER_TURN * turn

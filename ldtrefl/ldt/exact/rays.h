@@ -2,20 +2,21 @@
 //
 // The search is a chain of classes, one a file, each derived from the one before, so that every file compiles alone:
 //
-//     rays.h          what travels: the tree, a ray as it is asked for, eight rays made ready
+//     rays.h          what travels: the tree, and eight rays made ready of those that are asked for (ray_query.h)
 //     boxes.h         a ray against the eight boxes of a node
 //     triangles.h     a ray against a block of eight triangles
 //     patches.h       a ray against a block of eight patches; against a block of either kind
 //     single_rays.h   one ray down the tree, the nearest child first
 //     packets.h       rays that stay together: a node's boxes are tested against all of them at once
 //     rays_in_turn.h  rays that do not, a step each, so that memory works for the others while one waits
-//     walk.h          which of these three a ray takes
+//     packets_in_turn.h   packets, in the same way
+//     walk.h          which of these a ray takes
 //     answer.h        what a ray's record says of its hit
 //
 // Which way a ray takes changes no bit of its answer: the record alone decides where it is met, and of two records at
 // one t the one that stands first in memory is taken.
 
-struct TreeRays : Vectors {
+struct TreeRays : RayQuery {
     enum {
         LANES = 8,
         NODE = TREE_NODE,          // floats of a node: per axis eight lows, then eight highs; then eight children
@@ -34,12 +35,6 @@ struct TreeRays : Vectors {
         const float *nodes, *rows;
         const float *low, *high;  // the box about all records
         float half_patch;         // half the side of a patch
-    };
-
-    // A ray as it is asked for (tracer.py): hits at 0 <= t < t_max count.
-    struct Query {
-        double origin[3];
-        float direction[3], t_max;
     };
 
     // Eight rays, a lane each.

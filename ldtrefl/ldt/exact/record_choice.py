@@ -30,7 +30,6 @@ import numpy as np
 import warp as wp
 
 from ldtrefl.ldt.exact.patch_check import CheckedPatches, checked, unchecked
-from ldtrefl.ldt.exact.patches import PATCH_MARGIN
 from ldtrefl.ldt.exact.sample import Sample
 from ldtrefl.ldt.exact.survey import Survey
 from ldtrefl.ldt.options import Quality
@@ -92,9 +91,6 @@ MOST_KEPT = 0.5
 MOST_DOUBTFUL = 0.12
 """Share of doubtful patches from which half the triangles and more are kept, so that they need not be counted."""
 
-HORIZON = 1.0 / 3.0
-"""Of a patch's side, how far past a doubtful hit a search goes on."""
-
 
 @dataclass(frozen=True, eq=False)
 class PatchRecords:
@@ -107,10 +103,6 @@ class PatchRecords:
     frame: TexelFrame
     """The box of texels whose side is a patch's."""
     cells_per_texel: float
-    half_patch: float
-    """Half the side of a patch in its map, texels of ``frame``."""
-    horizon: float
-    """How far past a doubtful hit a search goes on, texels of ``frame``."""
     front: int
     """The side of the records that can be seen from outside, 1 or -1 along their normals; 0 if not known."""
 
@@ -207,5 +199,4 @@ def _records(survey: Survey, found: CheckedPatches, reliable: wp.array, kept: wp
     wp.copy(numbers, reliable)
     if kept.shape[0] > 0:
         wp.copy(numbers, kept, dest_offset=reliable.shape[0])
-    half = 0.5 + float(PATCH_MARGIN)
-    return PatchRecords(numbers, found.patches, survey.frame, survey.cells_per_texel, half, HORIZON, survey.front)
+    return PatchRecords(numbers, found.patches, survey.frame, survey.cells_per_texel, survey.front)

@@ -94,6 +94,7 @@ CONSTANTS: dict[str, float | int] = {
 
 FILES = (
     "device/vectors.h",
+    "tracing/ray_query.h",
     "ldt/exact/rays.h",
     "ldt/exact/boxes.h",
     "ldt/exact/triangles.h",
@@ -101,6 +102,7 @@ FILES = (
     "ldt/exact/single_rays.h",
     "ldt/exact/packets.h",
     "ldt/exact/rays_in_turn.h",
+    "ldt/exact/packets_in_turn.h",
     "ldt/exact/walk.h",
     "ldt/exact/answer.h",
 )

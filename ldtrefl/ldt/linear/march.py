@@ -168,7 +168,7 @@ def march_linear(
 def distance_to_near(query: Query) -> float:
     """How far a ray goes before it is near the object: from there on float32 is precise enough."""
     if wp.max(wp.abs(query.origin)) > NEAR:
-        return distance_passed(query.origin, query.direction, NEAR)
+        return float(distance_passed(query.origin, query.direction, NEAR))
     return 0.0
 
 

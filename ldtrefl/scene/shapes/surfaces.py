@@ -9,16 +9,27 @@ import numpy as np
 from ldtrefl.scene.mesh import Mesh
 
 Surface = Callable[[np.ndarray, np.ndarray], np.ndarray]
-"""Parameters u and v in 0..1, each (n,) -> (n, 3)."""
+"""Parameters in 0..1, u (columns,) and v (rows, 1) -> (rows, columns, 3) of the grid of them. What depends on one of
+them alone is so computed once for each of its values."""
+
+TOGETHER = 1 << 14
+"""Triangles that are looked at together, as many as caches hold."""
+
+
+def points(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """(..., 3) points of coordinates that numpy can broadcast."""
+    return np.stack(np.broadcast_arrays(x, y, z), -1)
 
 
 def grid_faces(columns: int, rows: int) -> np.ndarray:
     """(2 * columns * rows, 3): faces of a grid of (columns + 1) x (rows + 1) vertices, row by row; counter-clockwise
     seen from u x v."""
-    u, v = np.meshgrid(np.arange(columns), np.arange(rows))
-    corner = (v * (columns + 1) + u).reshape(-1)
-    right, up = corner + 1, corner + columns + 1
-    return np.concatenate([np.stack([corner, right, up + 1], 1), np.stack([corner, up + 1, up], 1)])
+    corner = np.arange(columns, dtype=np.int32) + (columns + 1) * np.arange(rows, dtype=np.int32)[:, None]
+    faces = np.empty((2, rows, columns, 3), np.int32)
+    for half, steps in zip(faces, ((0, 1, columns + 2), (0, columns + 2, columns + 1)), strict=True):
+        for k, step in enumerate(steps):
+            np.add(corner, step, out=half[:, :, k])
+    return faces.reshape(-1, 3)
 
 
 def without_collapsed(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
@@ -47,13 +58,21 @@ def parametric(
         wrap_v: the same along v.
         normal: the vertex normals; without it they are made from the triangles.
     """
-    i, j = np.meshgrid(np.arange(columns + 1), np.arange(rows + 1))
-    u = (i % columns if wrap_u else i).reshape(-1) / columns
-    v = (j % rows if wrap_v else j).reshape(-1) / rows
-    vertices = position(u, v)
-    uvs = np.stack([i.reshape(-1) / columns, j.reshape(-1) / rows], 1)
-    faces = without_collapsed(vertices, grid_faces(columns, rows))
-    return Mesh(vertices, faces, None if normal is None else normal(u, v), uvs)
+    i, j = np.arange(columns + 1), np.arange(rows + 1)[:, None]
+    u = (i % columns if wrap_u else i) / columns
+    v = (j % rows if wrap_v else j) / rows
+    grid = position(u, v)
+    vertices, faces = grid.reshape(-1, 3), grid_faces(columns, rows)
+    if _has_doubled(grid):
+        faces = without_collapsed(vertices, faces)
+    uvs = np.stack(np.broadcast_arrays(i / columns, j / rows), -1).reshape(-1, 2)
+    return Mesh(vertices, faces, None if normal is None else normal(u, v).reshape(-1, 3), uvs)
+
+
+def _has_doubled(grid: np.ndarray) -> bool:
+    """Whether neighbours of a (rows, columns, 3) grid of vertices, diagonal ones of ``grid_faces``, too, are equal."""
+    pairs = ((grid[:, 1:], grid[:, :-1]), (grid[1:], grid[:-1]), (grid[1:, 1:], grid[:-1, :-1]))
+    return any(bool((a == b).all(axis=-1).any()) for a, b in pairs)
 
 
 def revolved(profile: np.ndarray, around: int) -> Mesh:
@@ -61,8 +80,8 @@ def revolved(profile: np.ndarray, around: int) -> Mesh:
     rows = len(profile) - 1
 
     def position(u: np.ndarray, v: np.ndarray) -> np.ndarray:
-        radius, height = profile[np.round(v * rows).astype(int)].T
-        return np.stack([radius * np.cos(2 * np.pi * u), radius * np.sin(2 * np.pi * u), height], 1)
+        radius, height = np.moveaxis(profile[np.round(v * rows).astype(int)], -1, 0)
+        return points(radius * np.cos(2 * np.pi * u), radius * np.sin(2 * np.pi * u), height)
 
     return parametric(position, around, rows, wrap_u=True)
 
@@ -118,5 +137,9 @@ def outwards(mesh: Mesh) -> Mesh:
 
 def signed_volume(vertices: np.ndarray, faces: np.ndarray) -> float:
     """The volume of a closed mesh, positive if its triangles are counter-clockwise seen from outside."""
-    a, b, c = (vertices[faces[:, i]].astype(float) for i in range(3))
-    return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6.0
+    coordinates, volume = np.ascontiguousarray(vertices.T, float), 0.0
+    for first in range(0, len(faces), TOGETHER):
+        a, b, c = (coordinates[:, corner] for corner in faces[first : first + TOGETHER].T)
+        across = b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]
+        volume += float((a[0] * across[0] + a[1] * across[1] + a[2] * across[2]).sum())
+    return volume / 6.0

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from ldtrefl.scene.mesh import Mesh
 from ldtrefl.scene.shapes.base import Around, Fraction, bytes_without_normals, shape
-from ldtrefl.scene.shapes.surfaces import fitted, outwards, parametric
+from ldtrefl.scene.shapes.surfaces import fitted, outwards, parametric, points
 
 STEP = 1e-4
 """Of the curve's parameter, for its tangent by central differences: small enough for a curve that turns 64 times."""
@@ -30,19 +30,19 @@ def torus_knot(
 
     def curve(t: np.ndarray) -> np.ndarray:
         r = 2.0 + np.cos(q * t)
-        return np.stack([r * np.cos(p * t), r * np.sin(p * t), -np.sin(q * t)], 1)
+        return points(r * np.cos(p * t), r * np.sin(p * t), -np.sin(q * t))
 
     def position(u: np.ndarray, v: np.ndarray) -> np.ndarray:
         t = 2 * np.pi * u
         ahead, behind = curve(t + STEP), curve(t - STEP)
         tangent = ahead - behind
-        tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
+        tangent /= np.linalg.norm(tangent, axis=-1, keepdims=True)
         # A frame from the curve's position is periodic, which a Frenet frame's sign is not.
         outwards = ahead + behind
         binormal = np.cross(tangent, outwards)
-        binormal /= np.linalg.norm(binormal, axis=1, keepdims=True)
+        binormal /= np.linalg.norm(binormal, axis=-1, keepdims=True)
         across = np.cross(binormal, tangent)
-        angle = 2 * np.pi * v[:, None]
+        angle = 2 * np.pi * v[..., None]
         return curve(t) + 1.6 * tube * (np.cos(angle) * across + np.sin(angle) * binormal)
 
     return outwards(fitted(parametric(position, *segments, wrap_u=True, wrap_v=True)))

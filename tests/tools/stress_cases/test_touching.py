@@ -14,7 +14,7 @@ def lowest(what: str) -> float:
     heights = []
     for entry in touching(what, 4).objects:
         place, mesh = entry.world_from_object(), entry.geometry
-        if np.ptp(mesh.vertices[:, 2]) > 0 and entry.shape != "bowl" and entry.translate[0] != -1.8:
+        if np.ptp(mesh.vertices[:, 2]) > 0 and entry.shape != "bowl" and entry.name != "lamp":
             heights.append((mesh.vertices @ place[:3, :3].T + place[:3, 3])[:, 2].min())
     return max(map(abs, heights))
 

@@ -1,0 +1,66 @@
+"""The environment behind what the camera sees: the radiance of pixels in a row that see nothing else.
+
+An environment of two colours is filled in for as many pixels at once as a vector has lanes, in C++ (``backdrop.h``).
+"""
+
+from __future__ import annotations
+
+import warp as wp
+
+from ldtrefl.device.native_sources import native_body
+from ldtrefl.frame.gbuffer import pixel_ray
+from ldtrefl.geometry.vectors import as_single
+from ldtrefl.shading.environment import environment_radiance
+from ldtrefl.world.camera import CameraView, camera_ray
+from ldtrefl.world.records import LightingRecord
+
+FILES = ("device/vectors.h", "frame/backdrop.h")
+
+FILL = """
+const Backdrop::Row row = {
+    (float)width, {middle[0], middle[1], middle[2]}, {right[0], right[1], right[2]}, {up[0], up[1], up[2]},
+    {ground[0], ground[1], ground[2]}, {rise[0], rise[1], rise[2]}
+};
+Backdrop::fill(row, x, count, &radiance_out.data[pixel][0]);
+"""
+
+
+@wp.func_native(native_body({}, FILES, FILL))
+def fill_gradient(
+    middle: wp.vec3,
+    right: wp.vec3,
+    width: int,
+    up: wp.vec3,
+    ground: wp.vec3,
+    rise: wp.vec3,
+    x: int,
+    count: int,
+    pixel: int,
+    radiance_out: wp.array(dtype=wp.vec3),
+):
+    """Fill in ``count`` pixels of a row of ``width`` from ``pixel`` on, which is column ``x``. The row's middle looks
+    along ``middle``, its right end along ``middle + right``; the radiance is the ground's downwards, and ``rise`` more
+    upwards."""
+    ...
+
+
+@wp.func
+def fill_backdrop(
+    camera: CameraView, lighting: LightingRecord, begin: int, end: int, radiance_out: wp.array(dtype=wp.vec3)
+):
+    """Fill in the radiance of the environment for the pixels from ``begin`` to ``end``."""
+    i = int(begin)
+    while i < end:
+        row = i / camera.width
+        rest = wp.min(end, (row + 1) * camera.width)
+        if lighting.image_size[0] == 0:
+            half = wp.float64(0.5)
+            middle = as_single(camera_ray(camera, half * wp.float64(camera.width), wp.float64(row) + half))
+            right = as_single(camera.right)
+            rise, x = lighting.sky - lighting.ground, i - row * camera.width
+            fill_gradient(middle, right, camera.width, lighting.up, lighting.ground, rise, x, rest - i, i, radiance_out)
+            i = rest
+        else:
+            while i < rest:
+                radiance_out[i] = environment_radiance(lighting, wp.normalize(as_single(pixel_ray(camera, i))))
+                i += 1

@@ -1,0 +1,195 @@
+"""Surfaces where rays end, found for as many rays at once as a vector has lanes, in C++ (``surfaces.h``).
+
+Rays come in groups. What is read of an object is read once for all rays of a group that see it, and its surface is then
+found in vectors: on the CPU eight rays at a time, on CUDA one. ``surface.py`` says what a surface is.
+"""
+
+from __future__ import annotations
+
+import warp as wp
+
+from ldtrefl.device.bits import lowest_bit
+from ldtrefl.device.native_sources import native_body
+from ldtrefl.shading.specular import schlick
+from ldtrefl.shading.surface import Surface, albedo_at
+from ldtrefl.world.records import ObjectRecord
+
+GROUP = wp.constant(8)
+"""Rays of a group, at most."""
+
+SMALLEST_NORMAL = 1.0e-12
+"""Squared length of an interpolated normal below which the facet's normal is taken."""
+
+
+@wp.struct
+class Sighting:
+    """A point of an object's surface, and the direction that it is seen along."""
+
+    object: int  # -1 if none is seen
+    triangle: int
+    u: float  # barycentrics
+    v: float
+    view: wp.vec3  # unit; 0 if the eye touches the point
+    way: wp.vec3d  # the same of any length, for what is looked at from an eye
+
+
+CONSTANTS: dict[str, float | int] = {"SMALLEST_NORMAL": SMALLEST_NORMAL}
+FILES = ("device/vectors.h", "shading/surfaces.h")
+
+READ = """
+const auto& record = objects.data[k];
+Surfaces::Object object;
+object.vertices = (const float*)record.vertices.data;
+object.exact_vertices = record.exact_vertices.shape[0] ? (const double*)record.exact_vertices.data : nullptr;
+object.normals = record.smooth ? (const float*)record.normals.data : nullptr;
+object.faces = (const int*)record.faces.data;
+object.device_from_unit = &record.device_from_unit.data[0][0];
+object.unit_from_device = &record.unit_from_device.data[0][0];
+object.normal_from_unit = &record.normal_from_unit.data[0][0];
+// Lanes that are not asked for do what the first one does that is.
+int lane[Surfaces::WIDE], triangle[Surfaces::WIDE];
+for (int i = 0; i < Surfaces::WIDE; ++i) {
+    lane[i] = lanes >> i & 1 ? i : Surfaces::lowest_bit(lanes);
+    triangle[i] = sightings.data[lane[i]].triangle;
+}
+Surfaces::Points at;
+Surfaces::find_corners(object, triangle, at);
+"""
+FROM_EYE = """
+const double from[3] = {eye[0], eye[1], eye[2]};
+Surfaces::ThreeDouble way;
+for (int i = 0; i < Surfaces::WIDE; ++i) {
+    const auto& along = sightings.data[lane[i]].way;
+    way.x[i] = along[0];
+    way.y[i] = along[1];
+    way.z[i] = along[2];
+}
+Surfaces::place_on_rays(object, triangle, from, way, at);
+const Surfaces::Three view = Surfaces::unit(Surfaces::single_of(way));
+for (int i = 0; i < Surfaces::WIDE; ++i) {
+    auto& sighting = sightings.data[lane[i]];
+    sighting.view = wp::vec3(view.x[i], view.y[i], view.z[i]);
+    sighting.u = at.weight.y[i];
+    sighting.v = at.weight.z[i];
+}
+"""
+ALONG = """
+Surfaces::Wide u, v;
+Surfaces::Three view;
+for (int i = 0; i < Surfaces::WIDE; ++i) {
+    const auto& sighting = sightings.data[lane[i]];
+    u[i] = sighting.u;
+    v[i] = sighting.v;
+    view.x[i] = sighting.view[0];
+    view.y[i] = sighting.view[1];
+    view.z[i] = sighting.view[2];
+}
+Surfaces::place_at(object, u, v, at);
+"""
+STORE = """
+const Surfaces::Found found = Surfaces::normals_at(object, at, view);
+for (int i = 0; i < Surfaces::WIDE; ++i) {
+    auto& surface = surfaces.data[lane[i]];
+    surface.object = k;
+    surface.triangle = triangle[i];
+    surface.position = wp::vec3d(at.position.x[i], at.position.y[i], at.position.z[i]);
+    surface.normal = wp::vec3(found.normal.x[i], found.normal.y[i], found.normal.z[i]);
+    surface.facet = wp::vec3(found.facet.x[i], found.facet.y[i], found.facet.z[i]);
+    surface.is_back = found.is_back[i] != 0;
+}
+"""
+
+
+@wp.func_native(native_body(CONSTANTS, FILES, READ + FROM_EYE + STORE))
+def surfaces_of_object_from(
+    objects: wp.array(dtype=ObjectRecord),
+    k: int,
+    lanes: int,
+    eye: wp.vec3d,
+    sightings: wp.array(dtype=Sighting),
+    surfaces: wp.array(dtype=Surface),
+):
+    """Find the surface of object ``k`` for these lanes, a bit each, which see its triangles from ``eye`` along their
+    ways; and their barycentrics and views."""
+    ...
+
+
+@wp.func_native(native_body(CONSTANTS, FILES, READ + ALONG + STORE))
+def surfaces_of_object_along(
+    objects: wp.array(dtype=ObjectRecord),
+    k: int,
+    lanes: int,
+    sightings: wp.array(dtype=Sighting),
+    surfaces: wp.array(dtype=Surface),
+):
+    """Find the surface of object ``k`` for these lanes, a bit each, at their barycentrics, along their views."""
+    ...
+
+
+@wp.func
+def lanes_of(sightings: wp.array(dtype=Sighting), left: int, k: int) -> int:
+    """Of these lanes, a bit each, those that see object ``k``."""
+    lanes = int(0)
+    while left != 0:
+        bit = left & -left
+        if sightings[lowest_bit(wp.uint64(left))].object == k:
+            lanes = lanes | bit
+        left = left & ~bit
+    return lanes
+
+
+@wp.func
+def look_from(
+    objects: wp.array(dtype=ObjectRecord),
+    lanes: int,
+    eye: wp.vec3d,
+    sightings: wp.array(dtype=Sighting),
+    surfaces: wp.array(dtype=Surface),
+):
+    """Find the surfaces, but for their colours, that these lanes see, a bit each: where rays from ``eye`` along their
+    ways meet their triangles. Their barycentrics and views are set, too."""
+    left = lanes
+    while left != 0:
+        k = sightings[lowest_bit(wp.uint64(left))].object
+        same = lanes_of(sightings, left, k)
+        surfaces_of_object_from(objects, k, same, eye, sightings, surfaces)
+        left = left & ~same
+
+
+@wp.func
+def look_along(
+    objects: wp.array(dtype=ObjectRecord),
+    lanes: int,
+    sightings: wp.array(dtype=Sighting),
+    surfaces: wp.array(dtype=Surface),
+):
+    """Find the surfaces, but for their colours, at these lanes' barycentrics, a bit each, along their views."""
+    left = lanes
+    while left != 0:
+        k = sightings[lowest_bit(wp.uint64(left))].object
+        same = lanes_of(sightings, left, k)
+        surfaces_of_object_along(objects, k, same, sightings, surfaces)
+        left = left & ~same
+
+
+@wp.func
+def color_surface(
+    objects: wp.array(dtype=ObjectRecord),
+    sightings: wp.array(dtype=Sighting),
+    lane: int,
+    surfaces: wp.array(dtype=Surface),
+):
+    """Fill in the colours of a lane's surface."""
+    index, triangle = sightings[lane].object, sightings[lane].triangle
+    u, v = sightings[lane].u, sightings[lane].v
+    surfaces[lane].albedo = albedo_at(objects, index, triangle, u, v)
+    surfaces[lane].emission = objects[index].emission
+    mirror = objects[index].mirror
+    if objects[index].fresnel != 0:
+        mirror = schlick(mirror, -wp.dot(surfaces[lane].normal, sightings[lane].view))
+    surfaces[lane].mirror = mirror
+
+
+def group_on(device: wp.Device) -> int:
+    """Rays of a group on a device."""
+    return int(GROUP) if device.is_cpu else 1
