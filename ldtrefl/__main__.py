@@ -54,6 +54,7 @@ def main() -> int:
         return INTERRUPTED
     finally:
         _handle("SIGINT", _leave_at_once)
+        gc.unfreeze()  # who goes on may want it all freed: libraries complain of what is left at an ordinary end
 
 
 def _open_missing_streams() -> None:
@@ -77,7 +78,8 @@ def _handle(name: str, handler: Callable[[int, FrameType | None], Any]) -> None:
 
 
 def _watch_over_compiler() -> None:
-    """Let a signal end the program while Warp compiles: a call of up to six seconds, in which no handler runs.
+    """Let a signal end the program while Warp compiles, on this thread or on one that this one waits for: a call of up
+    to six seconds, in which no handler runs.
 
     Warp moves a compiled kernel to its place when it is whole, so nothing half-written is left.
     """
@@ -93,7 +95,8 @@ def _leave_from_warp(source: int) -> None:
         time.sleep(PATIENCE)
         frame = sys._current_frames().get(threading.main_thread().ident or 0)
         while frame is not None:
-            if frame.f_globals.get("__name__", "").split(".")[0] == "warp":
+            name = frame.f_globals.get("__name__", "")
+            if name.split(".")[0] == "warp" or name == "ldtrefl.device.build_ahead":
                 os._exit(128 + number)
             frame = frame.f_back
 

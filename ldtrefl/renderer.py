@@ -16,10 +16,11 @@ from numpy.typing import ArrayLike
 
 from ldtrefl.base import budget
 from ldtrefl.base.errors import InputError
-from ldtrefl.device import launch
+from ldtrefl.device import build_ahead, launch
 from ldtrefl.device.stats import Stats
 from ldtrefl.frame.camera_shading import shade_gbuffer
 from ldtrefl.frame.composite import composed
+from ldtrefl.frame.first_frame import OF_EVERY_SCENE
 from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.history import FrameHistory, FrameParts, Reusable
 from ldtrefl.frame.reflected_light import ReflectedLight
@@ -83,6 +84,8 @@ class Renderer:
         self._tracer = kind.scene_tracer(config)
         """Answers the rays of methods that have any, and the shadow rays of every method."""
         self._method = kind(device_scene, config, self._tracer)
+        if device_scene.device.is_cpu:
+            build_ahead.foresee([*self._method.first_kernels(), *OF_EVERY_SCENE], launch.thread_count())
         self._history = FrameHistory(keeps=self._skip.frames)
         self._bytes_taken = 0
         """Memory that has been asked for: what the largest frame so far needs."""

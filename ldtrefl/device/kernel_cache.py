@@ -20,14 +20,14 @@ import warp as wp
 
 from ldtrefl.base.errors import InputError
 from ldtrefl.base.standard_error import caught_stderr
-from ldtrefl.device import warp_abi
+from ldtrefl.device import build_ahead, warp_abi
 
 ROOM_BYTES = 4 << 20
 """Bytes that must fit into the folder before a kernel is compiled: all kernels of a render take 1 MB. On a full disk
 Warp's compiler leaves broken files or ends the process."""
 
 NOTICE = "compiling kernels for the first time, which takes up to half a minute (they are kept in {})"
-"""Measured: 4 s for `peel`, 16 s for a render, twice that where another program has a core."""
+"""Measured: 4 s for `peel`, 8 s for a render on two cores that do nothing else, twice that where others have one."""
 
 _log = logging.getLogger("ldtrefl")
 
@@ -94,6 +94,8 @@ def load(kernel: wp.Kernel, device: wp.Device) -> None:
     with _state.lock, _quiet():
         if key in _state.loaded:
             return
+        if device.is_cpu:
+            build_ahead.wait_for(kernel)
         is_compiled = warp_abi.is_compiled(kernel, device)
         if not is_compiled:
             _check_folder()
@@ -105,6 +107,8 @@ def load(kernel: wp.Kernel, device: wp.Device) -> None:
                 # Of a damaged file LLVM prints in its own words what is wrong.
                 with caught_stderr() if is_compiled else nullcontext():
                     _load(kernel, device)
+                if is_compiled is False and device.is_cpu and wp.config.cache_kernels:
+                    build_ahead.begin()
             except Exception as error:
                 # A damaged file, or a folder that has become full: compile once more, elsewhere.
                 if not is_compiled and not isinstance(error, OSError) and _has_room(wp.config.kernel_cache_dir):
@@ -190,6 +194,7 @@ def _compile_elsewhere(folder: str, reason: str) -> None:
             f"compiled kernels cannot be kept in {folder} ({reason}), nor in a temporary folder ({_reason(error)}); "
             f"set WARP_CACHE_PATH to a folder with {ROOM_BYTES >> 20} MB of room"
         ) from error
+    build_ahead.stop()
     _state.own_folder = made
     atexit.register(_remove, made, os.getpid())
     _state.is_announced = True

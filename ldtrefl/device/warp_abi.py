@@ -11,7 +11,9 @@ from __future__ import annotations
 
 import ctypes
 import re
-from collections.abc import Sequence
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Protocol, cast
 
@@ -185,6 +187,39 @@ def is_compiled(kernel: wp.Kernel, device: wp.Device) -> bool | None:
         return bool(wp.config.cache_kernels) and (folder / made).exists() and (folder / described).exists()
     except Exception:
         return None
+
+
+def compile_for_cpu(kernel: wp.Kernel) -> None:
+    """Compile a kernel into Warp's cache without loading it, if it is not there. If that fails, whoever loads it will
+    compile it, and hear why that fails."""
+    try:
+        module = kernel.module
+        module.get_module_hash(1)
+        module._compile(wp.get_device("cpu"), options=module.resolved_options[1])
+    except Exception:
+        forget_failure(kernel)
+
+
+@contextmanager
+def headers_of_thread(thread: int | None) -> Iterator[None]:
+    """Let this thread compile with the headers that another one has precompiled, in place of making its own for a
+    second and a half. Kernels of the CPU differ in no option, so nothing is written there any more."""
+    shared = False
+    own = threading.get_ident()
+    try:
+        runtime = wp._src.context.runtime
+        with runtime._pch_dirs_lock:
+            if thread in runtime._pch_dirs and own not in runtime._pch_dirs:
+                runtime._pch_dirs[own] = runtime._pch_dirs[thread]
+                shared = True
+    except Exception:
+        shared = False
+    try:
+        yield
+    finally:
+        if shared:
+            with runtime._pch_dirs_lock:
+                runtime._pch_dirs.pop(own, None)
 
 
 def forget_failure(kernel: wp.Kernel) -> None:

@@ -109,6 +109,10 @@ class Method(abc.ABC):
         """Go on with a scene in which some objects have moved, their meshes and all else the same."""
         self.scene = scene
 
+    def first_kernels(self) -> list[wp.Kernel]:
+        """Kernels that a first frame will need, those first that take longest to compile: they are compiled ahead."""
+        return []
+
     def camera_search(self, scene: DeviceScene, camera: Camera, stats: Stats) -> CameraSearch | None:
         """The objects of ``scene`` that this frame's camera rays are to be searched for in, and by what; None to draw
         all. It may depend on the scene and the camera alone. Called before anything else of a frame."""

@@ -11,15 +11,20 @@ needs a new tree.
 
 from __future__ import annotations
 
+import warp as wp
+
 from ldtrefl.device.stats import Stats
 from ldtrefl.frame.bounce_hits import FirstHits
 from ldtrefl.frame.bounces import RayFollower, summed_by_pixel
+from ldtrefl.frame.first_frame import kernels_of_rays
 from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.history import Reusable
 from ldtrefl.frame.reflected_light import ReflectedLight
 from ldtrefl.frame.refollow import followed_with_history
 from ldtrefl.frame.regions import FEW_OBJECTS, Regions, all_objects, safe_regions
 from ldtrefl.methods.base import RayConfig, RayMethod
+from ldtrefl.tracing.bvh import BVH
+from ldtrefl.tracing.bvh_walk import box_triangles
 from ldtrefl.tracing.ray_buffers import RayBuffer
 from ldtrefl.tracing.tracer import BoundTracer
 
@@ -31,6 +36,10 @@ class Bvh(RayMethod):
 
     Config = RayConfig
     config: RayConfig
+
+    def first_kernels(self) -> list[wp.Kernel]:
+        """What casts the rays, and builds their trees."""
+        return [*kernels_of_rays(self.scene, BVH, self.skip), box_triangles]
 
     def reflect_rays(
         self, gbuffer: GBuffer, rays: RayBuffer, reusable: Reusable | None, stats: Stats

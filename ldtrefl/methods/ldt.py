@@ -20,6 +20,7 @@ from collections.abc import Mapping
 from typing import Annotated, Literal
 
 import numpy as np
+import warp as wp
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
@@ -27,15 +28,24 @@ from ldtrefl.device.stats import Stats
 from ldtrefl.frame.bounce_hits import FirstHits
 from ldtrefl.frame.bounces import BounceLimits, RayFollower, summed_by_pixel
 from ldtrefl.frame.camera_shading import first_rays
+from ldtrefl.frame.first_frame import kernels_of_rays
 from ldtrefl.frame.flat_regions import flat_regions
 from ldtrefl.frame.footprint import finest_footprints
 from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.history import Reusable
 from ldtrefl.frame.reflected_light import ReflectedLight
 from ldtrefl.frame.refollow import followed_with_history
-from ldtrefl.frame.regions import FEW_OBJECTS, Regions, all_objects, objects_that_rays_meet, safe_regions
+from ldtrefl.frame.regions import (
+    FEW_OBJECTS,
+    Regions,
+    all_objects,
+    cull_runs,
+    objects_that_rays_meet,
+    safe_regions,
+)
 from ldtrefl.frame.search_choice import objects_to_search
 from ldtrefl.frame.searched_pixels import CameraSearch
+from ldtrefl.ldt.exact.build import KERNELS as TREE_KERNELS
 from ldtrefl.ldt.options import (
     BINARY_STEPS,
     DEFAULT_QUALITY,
@@ -48,6 +58,7 @@ from ldtrefl.ldt.options import (
 )
 from ldtrefl.ldt.resolution import resolutions_for
 from ldtrefl.ldt.scene_maps import MapOptions, SceneMaps
+from ldtrefl.ldt.searches import TRACERS
 from ldtrefl.methods.base import CONFIG, CommonConfig, RayConfig, RayMethod
 from ldtrefl.scene.description import Camera
 from ldtrefl.tracing.ray_buffers import RayBuffer
@@ -102,6 +113,11 @@ class Ldt(RayMethod):
         """Go on with a scene in which some objects have moved."""
         super().place(scene)
         self._has_moved = True
+
+    def first_kernels(self) -> list[wp.Kernel]:
+        """What searches for the rays, and what peels for the usual search."""
+        search, *others = kernels_of_rays(self.scene, TRACERS[self.config.search], self.skip)
+        return [search, *(TREE_KERNELS if self.config.search == "exact" else ()), *others, cull_runs]
 
     def camera_search(self, scene: DeviceScene, camera: Camera, stats: Stats) -> CameraSearch | None:
         """Meshes whose triangles are many and small in the image are searched by the exact search, unless maps are to

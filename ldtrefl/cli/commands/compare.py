@@ -17,6 +17,7 @@ from ldtrefl.compare.difference import difference_image
 from ldtrefl.compare.report import Row, compared, error_table, write_json
 from ldtrefl.files.atomic_write import writable_folder
 from ldtrefl.files.picture_writing import save_image
+from ldtrefl.frame.first_frame import foresee_a_frame
 from ldtrefl.frame.result import Frame
 from ldtrefl.methods import find_method
 from ldtrefl.renderer import Renderer
@@ -48,6 +49,7 @@ def compare(
 ) -> None:
     """Render a scene by several methods; print errors and write images and difference pictures."""
     use_resources(memory, threads)
+    foresee_a_frame(device)
     names = [name.strip() for name in methods.split(",") if name.strip()]
     options = _options_by_method(settings, [reference, *names])
     folder = writable_folder(output or Path(scene.stem + "-compare"), make=True)

@@ -18,6 +18,7 @@ from ldtrefl.cli.printing import say, stage_times
 from ldtrefl.cli.progress import progress_bar
 from ldtrefl.files.map_cache import MapCache, keep_maps_in
 from ldtrefl.files.picture_writing import check_writable, save_image
+from ldtrefl.frame.first_frame import foresee_a_frame
 from ldtrefl.methods import find_method
 from ldtrefl.renderer import Renderer
 from ldtrefl.scene.load import load_scene
@@ -47,6 +48,7 @@ def render(
 ) -> None:
     """Render a scene to a picture."""
     use_resources(memory, threads)
+    foresee_a_frame(device)
     path = check_writable(output or Path(scene.stem + ".png"))
     if cache is not None and no_cache:
         raise InputError("--cache and --no-cache exclude each other")

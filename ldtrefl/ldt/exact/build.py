@@ -12,12 +12,19 @@ import warp as wp
 from ldtrefl.base.budget import memory_limit
 from ldtrefl.base.errors import InputError
 from ldtrefl.ldt.exact.backs_check import shows_backs
-from ldtrefl.ldt.exact.binary_tree import binary_tree
+from ldtrefl.ldt.exact.binary_tree import (
+    binary_tree,
+    measure_cells,
+    number_cells,
+    sort_by_cell,
+    split_cells,
+    split_groups,
+)
 from ldtrefl.ldt.exact.patches import PATCH_MARGIN
 from ldtrefl.ldt.exact.record_choice import PatchRecords, choose_records
 from ldtrefl.ldt.exact.records import Records
 from ldtrefl.ldt.exact.tree import Tree
-from ldtrefl.ldt.exact.wide_tree import wide_tree
+from ldtrefl.ldt.exact.wide_tree import gather_nodes, wide_tree, write_nodes
 from ldtrefl.ldt.options import Quality
 from ldtrefl.world.device_mesh import DeviceMesh
 
@@ -28,6 +35,10 @@ MOST_RECORDS = 100_000_000
 
 HORIZON = 1.0 / 3.0
 """Texels past a doubtful hit from which a search goes on."""
+
+
+KERNELS = (write_nodes, split_groups, measure_cells, number_cells, split_cells, gather_nodes, sort_by_cell)
+"""Those of a tree over triangles."""
 
 
 def build_tree(geometry: DeviceMesh, resolution: int, quality: Quality, *, trusted: bool = False) -> Tree:

@@ -104,7 +104,8 @@ def write_nodes(
     """A thread writes one wide node, and the blocks among its children."""
     i = first + wp.tid()
     place = NODE * i
-    for lane in range(LANES):
+    lanes = int(LANES)  # a variable: Warp would write the loop out, and its compiler take twice as long
+    for lane in range(lanes):
         part = parts[LANES * i + lane]
         low, high = wp.vec4(EMPTY), wp.vec4(-EMPTY)
         if part >= 0:

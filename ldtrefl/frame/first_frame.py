@@ -1,0 +1,40 @@
+"""The kernels of a first frame: where none are compiled yet, they are while the scene is made ready
+(``device/build_ahead.py``). A list names those first that take longest to compile."""
+
+from __future__ import annotations
+
+import warp as wp
+
+from ldtrefl.device import build_ahead, launch
+from ldtrefl.frame.bounces import shade_hits_kernel
+from ldtrefl.frame.camera_shading import shade_pixels_kernel, shade_reflectors_kernel
+from ldtrefl.frame.composite import add_reflection, copy_pixels
+from ldtrefl.frame.large_triangles import draw_large_triangles
+from ldtrefl.frame.projection import project_vertices
+from ldtrefl.frame.skip_options import SkipOptions
+from ldtrefl.frame.visibility import resolve_pixels
+from ldtrefl.frame.zbuffer import draw_triangles
+from ldtrefl.tracing.closest_hits import closest_hits_kernel
+from ldtrefl.tracing.nothing import NOTHING
+from ldtrefl.tracing.tracer import Tracer, block_of
+from ldtrefl.world.device_scene import DeviceScene
+
+OF_EVERY_SCENE = (draw_large_triangles, draw_triangles, resolve_pixels, project_vertices, add_reflection, copy_pixels)
+"""What draws the G-buffer and composes the image."""
+
+
+def foresee_a_frame(device: str | None) -> None:
+    """Say that a frame of some scene will be rendered on a device, by default the CPU, before the scene is read."""
+    if device in (None, "cpu"):
+        build_ahead.foresee(OF_EVERY_SCENE, launch.thread_count())
+
+
+def kernels_of_rays(scene: DeviceScene, tracer: Tracer, skip: SkipOptions) -> list[wp.Kernel]:
+    """What follows the rays of a scene by a tracer, and shades what they and the camera see."""
+    shadow = tracer if scene.lighting.shadows else NOTHING
+    return [
+        closest_hits_kernel(tracer, block_of(scene.device), skip.bounds),
+        shade_hits_kernel(shadow),
+        shade_pixels_kernel(shadow),
+        shade_reflectors_kernel(shadow, True),
+    ]
