@@ -37,9 +37,12 @@ BAND_PIXELS = 1 << 20
 """Pixels of a band, about: enough rays for all threads, and their arrays take less than 0.2 GB."""
 
 
-PIXELS_IN_A_ROW = 64
-"""Pixels that one thread of a CPU finds: neighbours often see the same triangle, which is then projected once, and
-different ones come from memory together. With 16 it takes a twentieth longer."""
+PIXELS_IN_A_ROW = 16
+"""Pixels that one thread of a CPU finds: neighbours often see the same triangle, which is then projected once."""
+
+UNCACHED = 1 << 20
+"""Triangles of a scene from which caches do not hold them, and those that pixels see are asked of memory together
+(``fetch_ahead.py``). What caches hold comes sooner without that."""
 
 
 @wp.func
@@ -113,13 +116,14 @@ def resolve_pixels(
     width: int,
     first_row: int,
     run: int,
+    fetches: int,  # 1 to ask for the triangles of a run together
     # Out, the reflectors 0 before:
     seen: GBufferView,
 ):
     """Find which point of which triangle each pixel of a run sees, from its key."""
     begin = run * (first + wp.tid())
     end = wp.min(begin + run, keys.shape[0])
-    if run > 1:
+    if fetches == 1:
         fetch_triangles(keys, begin, end, objects, drawn, place_of, numbers, corners)
     i = int(begin)
     while i < end:
@@ -172,7 +176,8 @@ def resolved(drawing: Drawing, scene: DeviceScene) -> GBuffer:
     places = wp.array(place_of, dtype=wp.int32, device=device)
     run = PIXELS_IN_A_ROW if device.is_cpu else 1
     known = [scene.records, drawn, places, scene.triangle_numbers]
-    inputs = [drawing.keys, *known, drawing.room.corners, camera.width, drawing.band.first_row, run, view]
+    inputs = [drawing.keys, *known, drawing.room.corners, camera.width, drawing.band.first_row, run]
+    inputs += [int(device.is_cpu and scene.triangle_counts.sum() >= UNCACHED), view]
     launch.launch(resolve_pixels, -(-pixels // run), inputs, device)
     return GBuffer(scene, camera, view, drawing.band)
 

@@ -18,4 +18,5 @@ def test_runs_of_any_length_give_the_bits_of_single_pixels(
     monkeypatch.setattr(visibility, "PIXELS_IN_A_ROW", 1)
     expected = draw_gbuffer(on_device(scene), scene.camera)
     monkeypatch.setattr(visibility, "PIXELS_IN_A_ROW", run)
+    monkeypatch.setattr(visibility, "UNCACHED", 0)
     assert_same(draw_gbuffer(on_device(scene), scene.camera), expected)
