@@ -23,7 +23,7 @@ FEWEST_TRIANGLES = 20_000
 TRIANGLE_NANOSECONDS = 40.0
 """To draw a triangle, its share of the vertices included."""
 
-PIXEL_NANOSECONDS = 130.0
+PIXEL_NANOSECONDS = 105.0
 """To search for a pixel's ray."""
 
 LARGEST_SIZE = 2048.0

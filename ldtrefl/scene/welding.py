@@ -13,6 +13,9 @@ import warp as wp
 
 from ldtrefl.device import launch
 
+AHEAD = wp.constant(16)
+"""Rows by which the memory of a row's chain is asked for ahead of it."""
+
 
 @wp.func
 def mixed(value: wp.uint64, more: wp.uint64):
@@ -21,6 +24,28 @@ def mixed(value: wp.uint64, more: wp.uint64):
     x = (x ^ (x >> wp.uint64(30))) * wp.uint64(0xBF58476D1CE4E5B9)
     x = (x ^ (x >> wp.uint64(27))) * wp.uint64(0x94D049BB133111EB)
     return x ^ (x >> wp.uint64(31))
+
+
+FETCH = """
+#if !defined(__CUDA_ARCH__)
+    __builtin_prefetch((const int*)chains.data + chain);
+#endif
+"""
+
+
+@wp.func_native(FETCH)
+def fetch_chain(chains: wp.array(dtype=wp.int32), chain: int):
+    """Have memory bring the beginning of a chain."""
+    ...
+
+
+@wp.func
+def chain_of(keys: wp.array2d(dtype=wp.uint64), i: int, seed: wp.uint64, mask: wp.uint64) -> int:
+    """The chain that a row belongs to."""
+    hashed = seed
+    for j in range(keys.shape[1]):
+        hashed = mixed(hashed, keys[i, j])
+    return int(hashed & mask)
 
 
 @launch.kernel
@@ -37,10 +62,9 @@ def find_firsts(
 ):
     """Find the first row equal to one row in its chain, or else add it to the chain. Rows are taken in order."""
     i = first + wp.tid()
-    hashed = seed
-    for j in range(keys.shape[1]):
-        hashed = mixed(hashed, keys[i, j])
-    chain = int(hashed & mask)
+    if i + AHEAD < keys.shape[0]:
+        fetch_chain(chains_out, chain_of(keys, i + AHEAD, seed, mask))
+    chain = chain_of(keys, i, seed, mask)
     found = int(-1)
     k = int(chains_out[chain])
     while k >= 0 and found < 0:

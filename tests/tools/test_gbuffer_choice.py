@@ -13,11 +13,12 @@ from ldtrefl.tracing.bvh import Raycaster
 from ldtrefl.world.device_scene import DeviceScene
 
 
-def test_a_quick_run_prints_three_times(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_quick_run_prints_five_times(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setattr("sys.argv", ["gbuffer_choice.py", "--quick"])
     gbuffer_choice.main()
     _, line = capsys.readouterr().out.splitlines()
-    times = re.fullmatch(r" +10 k triangles: z-buffer +([\d.]+), BVH build +([\d.]+), BVH rays +([\d.]+)", line)
+    names = ("z-buffer", "BVH build", "BVH rays", "tree build", "search")
+    times = re.fullmatch(" +10 k triangles: " + ", ".join(rf"{name} +([\d.]+)" for name in names), line)
     assert times is not None and all(float(time) > 0.0 for time in times.groups()), line
 
 

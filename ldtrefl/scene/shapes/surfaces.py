@@ -21,6 +21,15 @@ def points(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
     return np.stack(np.broadcast_arrays(x, y, z), -1)
 
 
+def frozen(array: np.ndarray) -> np.ndarray:
+    """The same array, read-only with all that it is a view of: a mesh takes it without a copy."""
+    part: np.ndarray | None = array
+    while part is not None:
+        part.flags.writeable = False
+        part = part.base
+    return array
+
+
 def grid_faces(columns: int, rows: int) -> np.ndarray:
     """(2 * columns * rows, 3): faces of a grid of (columns + 1) x (rows + 1) vertices, row by row; counter-clockwise
     seen from u x v."""
@@ -66,7 +75,8 @@ def parametric(
     if _has_doubled(grid):
         faces = without_collapsed(vertices, faces)
     uvs = np.stack(np.broadcast_arrays(i / columns, j / rows), -1).reshape(-1, 2)
-    return Mesh(vertices, faces, None if normal is None else normal(u, v).reshape(-1, 3), uvs)
+    normals = None if normal is None else normal(u, v).reshape(-1, 3)
+    return Mesh(frozen(vertices), frozen(faces), normals, frozen(uvs.astype(np.float32)))
 
 
 def _has_doubled(grid: np.ndarray) -> bool:
@@ -125,14 +135,14 @@ def joined(*meshes: Mesh) -> Mesh:
 def fitted(mesh: Mesh) -> Mesh:
     """The mesh moved and scaled so that its longest side runs from -1 to 1. Normals are kept, and not made."""
     centre, half = mesh.unit_frame
-    return Mesh((mesh.vertices - centre) / half, mesh.faces, mesh.stored_normals, mesh.uvs)
+    return Mesh(frozen((mesh.vertices - centre) / half), mesh.faces, mesh.stored_normals, mesh.uvs)
 
 
 def outwards(mesh: Mesh) -> Mesh:
     """The mesh wound so that its volume is positive."""
     if signed_volume(mesh.vertices, mesh.faces) >= 0:
         return mesh
-    return Mesh(mesh.vertices, mesh.faces[:, ::-1], None, mesh.uvs)
+    return Mesh(mesh.vertices, frozen(np.ascontiguousarray(mesh.faces[:, ::-1])), None, mesh.uvs)
 
 
 def signed_volume(vertices: np.ndarray, faces: np.ndarray) -> float:
