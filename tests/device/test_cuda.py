@@ -9,6 +9,7 @@ import warp as wp
 from ldtrefl.device import launch
 from ldtrefl.frame.bounces import shade_hits_kernel
 from ldtrefl.frame.camera_shading import shade_pixels_kernel, shade_reflectors_kernel
+from ldtrefl.frame.searched_pixels import search_pixels_kernel
 from ldtrefl.ldt.searches import TRACERS
 from ldtrefl.renderer import Renderer  # noqa: F401  (imports every module that defines kernels)
 from ldtrefl.tracing.batch import batch_kernel
@@ -26,6 +27,7 @@ def all_kernels() -> list[wp.Kernel]:
         batch_kernel(tracer, 1)
         batch_kernel(tracer, 1, True)
         closest_hits_kernel(tracer, 1)
+        search_pixels_kernel(tracer, 1)
     for tracer in (NOTHING, BVH, *TRACERS.values()):
         shade_hits_kernel(tracer)
         shade_pixels_kernel(tracer)

@@ -21,7 +21,7 @@ from ldtrefl.device import launch
 from ldtrefl.device.bins import bin_items
 from ldtrefl.device.native_sources import native_body
 from ldtrefl.geometry.box import cell_holding, cell_number
-from ldtrefl.ldt.exact.records import Records, Reference, record_number, reference_to
+from ldtrefl.ldt.exact.records import Records, Reference, fetch_ahead, record_number, reference_to
 from ldtrefl.ldt.exact.tree import LANES
 
 CELLS_PER_ROOT = 0.13
@@ -118,6 +118,7 @@ def measure_cells(
     begin, end = start[occupied[i]], start[occupied[i] + 1]
     made = reference_to(records, sorted_records[begin])
     for k in range(begin + 1, end):
+        fetch_ahead(records, sorted_records, k)
         one = reference_to(records, sorted_records[k])
         made.low = wp.min(made.low, one.low)
         made.high = wp.max(made.high, one.high)
@@ -201,6 +202,7 @@ def gather_references(given: SortedRecords, group: Group, references_out: wp.arr
     for k in range(group.first_cell, group.first_cell + group.cell_count):
         cell = wp.cast(given.cells[k].low[3], wp.int32)
         for i in range(given.start[cell], given.start[cell + 1]):
+            fetch_ahead(given.records, given.numbers, i)
             references_out[at] = reference_to(given.records, given.numbers[i])
             at += 1
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import warp as wp
 
+from ldtrefl.device.native_sources import native_body
 from ldtrefl.ldt.exact.patch import LARGE, Patch, patch_high, patch_low, patch_middle, patch_normal
 from ldtrefl.ldt.exact.tree import LANES, LARGE_AXIS, PATCH_AXIS_ROW, PATCH_TRIANGLE_ROW, TRIANGLE_NUMBER_ROW
 
@@ -29,6 +30,28 @@ class Reference:
 
     low: wp.vec4  # and the bits of their number
     high: wp.vec4  # and how many records there are
+
+
+AHEAD = 16
+"""Records by which the memory of a triangle's corners is asked for ahead of it; that of their numbers twice as many."""
+
+FETCH = """
+#if !defined(__CUDA_ARCH__)
+    const int* faces = (const int*)records.faces.data;
+    const long long last = (long long)order.shape[0] - 1, near = i + AHEAD, far = i + 2 * AHEAD;
+    const int coming = order.data[far < last ? far : last], next = order.data[near < last ? near : last];
+    if (coming >= 0) __builtin_prefetch(faces + 3 * (long long)coming);
+    if (next >= 0)
+        for (int k = 0; k < 3; ++k)
+            __builtin_prefetch((const float*)records.vertices.data + 3 * (long long)faces[3 * (long long)next + k]);
+#endif
+"""
+
+
+@wp.func_native(native_body({"AHEAD": AHEAD}, (), FETCH))
+def fetch_ahead(records: Records, order: wp.array(dtype=wp.int32), i: int):
+    """Have memory bring the triangles that come after record ``order[i]``: they may lie anywhere in it."""
+    ...
 
 
 @wp.func

@@ -13,7 +13,7 @@ from ldtrefl.device import launch
 from ldtrefl.device.native_sources import native_body
 from ldtrefl.ldt.exact import binary_tree
 from ldtrefl.ldt.exact.binary_tree import EMPTY, Node
-from ldtrefl.ldt.exact.records import Records, write_patch, write_triangle
+from ldtrefl.ldt.exact.records import Records, fetch_ahead, write_patch, write_triangle
 from ldtrefl.ldt.exact.tree import (
     BOX_MARGIN,
     LANES,
@@ -79,6 +79,7 @@ def write_block(records: Records, node: Node, child: int, order: wp.array(dtype=
     at = LANES * (~child >> 1)
     is_patch = (~child & 1) == 1
     for k in range(count):
+        fetch_ahead(records, order, begin + k)
         if is_patch:
             write_patch(records, order[begin + k], at + k, rows)
         else:
