@@ -17,6 +17,7 @@ from ldtrefl.geometry.perspective_raster import (
     inverse_depth,
     lowest,
     perspective_weights,
+    planar_covers,
     planar_edge,
     planar_nearness,
 )
@@ -88,7 +89,7 @@ def row_bounds(p: wp.vec3d, q: wp.vec3d, area: wp.float64) -> wp.vec4d:
     the triangle's."""
     rise = q[1] - p[1]
     bounds = wp.vec4d(-GUARD, BEHIND, GUARD, BEHIND)
-    if wp.abs(rise) > LEAST_RISE and wp.abs(area) > LEAST_AREA:
+    if wp.abs(rise) > LEAST_RISE:
         slope = (q[0] - p[0]) / rise
         offset = p[0] - slope * p[1]
         if (rise > BEHIND) == (area > BEHIND):
@@ -102,11 +103,14 @@ def row_bounds(p: wp.vec3d, q: wp.vec3d, area: wp.float64) -> wp.vec4d:
 
 @wp.func
 def draw_cut_rows(target: Target, triangle: Triangle, box: PixelBox, first_y: int, last_y: int):
-    """Draw a planar triangle's pixels, testing of each row only those between its edges."""
+    """Draw a planar triangle's pixels row by row: from the first pixel inside to the last. What lies between two pixels
+    inside is inside, and 1 / depth is linear in the image: neither is tested nor interpolated pixel by pixel."""
     half = wp.float64(0.5)
     a, b, c = triangle.a, triangle.b, triangle.c
     nearest = nearness_bits(highest(a[2], b[2], c[2]))
     area = planar_edge(a, b, c[0], c[1])
+    across = ((b[2] - a[2]) * (c[1] - a[1]) - (c[2] - a[2]) * (b[1] - a[1])) / area
+    down = ((c[2] - a[2]) * (b[0] - a[0]) - (b[2] - a[2]) * (c[0] - a[0])) / area
     ab, bc, ca = row_bounds(a, b, area), row_bounds(b, c, area), row_bounds(c, a, area)
     begin, end = wp.float64(box.first_x), wp.float64(box.last_x) + wp.float64(1.0)
     y = int(first_y)
@@ -116,9 +120,14 @@ def draw_cut_rows(target: Target, triangle: Triangle, box: PixelBox, first_y: in
         high = lowest(ab[2] + ab[3] * at_y, bc[2] + bc[3] * at_y, ca[2] + ca[3] * at_y)
         x = first_pixel(lowest(highest(low, begin, begin), end, end))
         last_x = last_pixel(highest(lowest(high, end, end), begin, begin))
+        while x <= last_x and not planar_covers(a, b, c, wp.float64(x) + half, at_y):
+            x += 1
+        while x < last_x and not planar_covers(a, b, c, wp.float64(last_x) + half, at_y):
+            last_x -= 1
+        in_row = a[2] + down * (at_y - a[1])
         while x <= last_x:
             if not is_behind(target, x, y, nearest):
-                nearness = planar_nearness(a, b, c, wp.float64(x) + half, at_y)
+                nearness = float(in_row + across * (wp.float64(x) + half - a[0]))
                 keep_nearest(target, triangle.number, x, y, nearness)
             x += 1
         y += 1
@@ -129,7 +138,8 @@ def draw_rows(target: Target, triangle: Triangle, box: PixelBox, first_y: int, l
     """Draw a triangle's pixels from row ``first_y`` to ``last_y``."""
     a, b, c = triangle.a, triangle.b, triangle.c
     half = wp.float64(0.5)
-    if box.planar and box.last_x - box.first_x + 1 >= WIDE:
+    is_wide = box.planar and box.last_x - box.first_x + 1 >= WIDE
+    if is_wide and wp.abs(planar_edge(a, b, c[0], c[1])) > LEAST_AREA:
         draw_cut_rows(target, triangle, box, first_y, last_y)
     elif box.planar:
         nearest = nearness_bits(highest(a[2], b[2], c[2]))

@@ -95,3 +95,10 @@ def planar_nearness(a: wp.vec3d, b: wp.vec3d, c: wp.vec3d, x: wp.float64, y: wp.
     if area == zero:
         return 0.0
     return float((at_a * a[2] + at_b * b[2] + at_c * c[2]) / area)
+
+
+@wp.func
+def planar_covers(a: wp.vec3d, b: wp.vec3d, c: wp.vec3d, x: wp.float64, y: wp.float64) -> bool:
+    """Whether a triangle that has an area covers a pixel: as ``planar_nearness`` tells."""
+    at_a, at_b, at_c = planar_edge(b, c, x, y), planar_edge(c, a, x, y), planar_edge(a, b, x, y)
+    return lowest(at_a, at_b, at_c) >= wp.float64(0.0) or highest(at_a, at_b, at_c) <= wp.float64(0.0)
