@@ -132,24 +132,41 @@ def resolve_pixels(
 
 
 def resolved(drawing: Drawing, scene: DeviceScene) -> GBuffer:
-    """The G-buffer of what was drawn: which point of which triangle each pixel sees."""
+    """The G-buffer of what was drawn: which triangle each pixel sees."""
     device, camera, pixels = scene.device, drawing.camera, drawing.keys.shape[0]
     view = GBufferView()
     view.object, view.triangle = (wp.empty(pixels, dtype=wp.int32, device=device) for _ in range(2))
     view.reflector = wp.zeros(pixels, dtype=wp.uint8, device=device)
     view.camera = camera_view(camera, scene.device_from_world, drawing.band)
-    objects = DrawnObjects.joined([part.objects for part in drawing.drawn])
-    drawn = drawing.drawn[0].drawn if len(drawing.drawn) == 1 else None
-    if drawn is None:
-        drawn = objects.on_device(np.concatenate([part.first_corners for part in drawing.drawn]), device)
-    place_of = np.full(len(scene.objects), -1, np.int32)
-    place_of[objects.numbers] = np.arange(len(objects.numbers))
-    places = wp.array(place_of, dtype=wp.int32, device=device)
+    drawn, places = _drawn_by_object(drawing, scene)
     run = PIXELS_IN_A_ROW if device.is_cpu else 1
-    known = [scene.records, drawn, places, scene.triangle_numbers]
-    inputs = [drawing.keys, *known, drawing.room.corners, camera.width, drawing.band.first_row, run, view]
+    inputs = [
+        drawing.keys,
+        scene.records,
+        drawn,
+        places,
+        scene.triangle_numbers,
+        drawing.room.corners,
+        camera.width,
+        drawing.band.first_row,
+        run,
+        view,
+    ]
     launch.launch(resolve_pixels, -(-pixels // run), inputs, device)
     return GBuffer(scene, camera, view, drawing.band)
+
+
+def _drawn_by_object(drawing: Drawing, scene: DeviceScene) -> tuple[wp.array, wp.array]:
+    """What was drawn, (n,) ``DrawnObject``, and (objects,) int32 the place there of each object of the scene, -1 of
+    others. Both are empty where a number tells a triangle by itself: nothing of them is read."""
+    device = scene.device
+    if scene.triangle_numbers.shift == 0:
+        return wp.empty(0, dtype=DrawnObject, device=device), wp.empty(0, dtype=wp.int32, device=device)
+    objects = DrawnObjects.joined([part.objects for part in drawing.drawn])
+    drawn = objects.on_device(np.concatenate([part.first_corners for part in drawing.drawn]), device)
+    place_of = np.full(len(scene.objects), -1, np.int32)
+    place_of[objects.numbers] = np.arange(len(objects.numbers))
+    return drawn, wp.array(place_of, dtype=wp.int32, device=device)
 
 
 def draw_gbuffer(scene: DeviceScene, camera: Camera, search: CameraSearch | None = None) -> GBuffer:

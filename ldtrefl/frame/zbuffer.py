@@ -100,8 +100,6 @@ class DrawnPart:
     objects: DrawnObjects
     first_corners: np.ndarray
     """(n,) the place of each object's first corner, -1 if its corners are not kept."""
-    drawn: wp.array | None
-    """(n,) ``DrawnObject``, if they were drawn at once."""
 
 
 class Drawing:
@@ -138,7 +136,7 @@ class Drawing:
         self._draw_all(scene, objects.some(~are_searched), are_projected=are_projected)
         if search is not None and are_searched.any():
             searched = objects.some(are_searched)
-            self.drawn.append(DrawnPart(searched, np.full(len(searched.numbers), -1), None))
+            self.drawn.append(DrawnPart(searched, np.full(len(searched.numbers), -1)))
             search_pixels(scene, self.camera, self.band, searched, search.tracer, self._target())
 
     def _draw_all(self, scene: DeviceScene, objects: DrawnObjects, *, are_projected: bool) -> None:
@@ -149,7 +147,7 @@ class Drawing:
             return
         self._draw_apart(scene, objects.some(~are_instances), are_projected=are_projected)
         instances = objects.some(are_instances)
-        self.drawn.append(DrawnPart(instances, np.full(len(instances.numbers), -1), None))
+        self.drawn.append(DrawnPart(instances, np.full(len(instances.numbers), -1)))
         draw_all_instances(scene, instances, self._target())
 
     def _draw_apart(self, scene: DeviceScene, objects: DrawnObjects, *, are_projected: bool) -> None:
@@ -157,10 +155,10 @@ class Drawing:
         first, device = self.room.first[objects.numbers], scene.device
         if self.room.keeps:
             drawn = objects.on_device(first, device)
-            self.drawn.append(DrawnPart(objects, first, drawn))
+            self.drawn.append(DrawnPart(objects, first))
             self._draw(scene, objects.numbers, drawn, self.room.corners, are_projected=are_projected)
             return
-        self.drawn.append(DrawnPart(objects, first, None))
+        self.drawn.append(DrawnPart(objects, first))
         for part, counts in _parts(scene.vertex_counts[objects.numbers]):
             corners = wp.empty(int(counts.sum()), dtype=wp.vec3d, device=device)
             drawn = objects.some(part).on_device(np.cumsum(counts) - counts, device)
