@@ -13,7 +13,8 @@ from ldtrefl.device.bits import lowest_bit
 from ldtrefl.frame.pixel_order import pixels_in_blocks
 from ldtrefl.scene.description import Camera
 from ldtrefl.shading.surface import Surface
-from ldtrefl.shading.surfaces import GROUP, Sighting, group_on, look_from
+from ldtrefl.shading.surfaces import GROUP, Sighting, look_from
+from ldtrefl.tracing.tracer import block_of
 from ldtrefl.world.camera import Band, CameraView, camera_ray
 from ldtrefl.world.device_scene import DeviceScene
 from ldtrefl.world.records import ObjectRecord
@@ -49,29 +50,32 @@ def sight(gbuffer: GBufferView, pixel: int, sightings: wp.array(dtype=Sighting),
 def find_surfaces(
     first: int,
     # In:
-    group: int,
+    block: int,
     gbuffer: GBufferView,
     objects: wp.array(dtype=ObjectRecord),
     # Out:
     position_out: wp.array(dtype=wp.vec3d),
     normal_out: wp.array(dtype=wp.vec3),
 ):
-    """Find where the surfaces of a group of pixels lie, and their shading normals."""
-    begin = group * (first + wp.tid())
+    """Find where the surfaces of a block of pixels lie, and their shading normals."""
     sight_memory, surface_memory = wp.zeros(shape=GROUP, dtype=Sighting), wp.zeros(shape=GROUP, dtype=Surface)
     sightings = wp.array(ptr=sight_memory.ptr, shape=(GROUP,), dtype=Sighting)
     surfaces = wp.array(ptr=surface_memory.ptr, shape=(GROUP,), dtype=Surface)
-    lanes = int(0)
-    for i in range(begin, wp.min(begin + group, position_out.shape[0])):
-        if gbuffer.object[i] >= 0:
-            sight(gbuffer, i, sightings, i - begin)
-            lanes = lanes | (1 << (i - begin))
-    look_from(objects, lanes, gbuffer.camera.eye, sightings, surfaces)
-    while lanes != 0:
-        lane = lowest_bit(wp.uint64(lanes))
-        lanes = lanes & (lanes - 1)
-        position_out[begin + lane] = surfaces[lane].position
-        normal_out[begin + lane] = surfaces[lane].normal
+    begin = block * (first + wp.tid())
+    end = wp.min(begin + block, position_out.shape[0])
+    while begin < end:
+        lanes = int(0)
+        for i in range(begin, wp.min(begin + GROUP, end)):
+            if gbuffer.object[i] >= 0:
+                sight(gbuffer, i, sightings, i - begin)
+                lanes = lanes | (1 << (i - begin))
+        look_from(objects, lanes, gbuffer.camera.eye, sightings, surfaces)
+        while lanes != 0:
+            lane = lowest_bit(wp.uint64(lanes))
+            lanes = lanes & (lanes - 1)
+            position_out[begin + lane] = surfaces[lane].position
+            normal_out[begin + lane] = surfaces[lane].normal
+        begin += GROUP
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +132,7 @@ class GBuffer:
         device = self.scene.device
         position = wp.zeros(self.pixel_count, dtype=wp.vec3d, device=device)
         normal = wp.zeros(self.pixel_count, dtype=wp.vec3, device=device)
-        group = group_on(device)
-        inputs = [group, self.view, self.scene.records, position, normal]
-        launch.launch(find_surfaces, -(-self.pixel_count // group), inputs, device)
+        block = block_of(device)
+        inputs = [block, self.view, self.scene.records, position, normal]
+        launch.launch(find_surfaces, -(-self.pixel_count // block), inputs, device)
         return position, normal

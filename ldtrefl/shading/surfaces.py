@@ -192,8 +192,3 @@ def color_surface(
     if objects[index].fresnel != 0:
         cosine = -wp.dot(surfaces[lane].normal, sightings[lane].view)
         surfaces[lane].mirror = schlick(objects[index].mirror, cosine)
-
-
-def group_on(device: wp.Device) -> int:
-    """Rays of a group on a device."""
-    return int(GROUP) if device.is_cpu else 1

@@ -10,7 +10,7 @@ from ldtrefl.device import launch
 from ldtrefl.scene.description import Camera, Object, Scene
 from ldtrefl.scene.mesh import Mesh
 from ldtrefl.shading.surface import Surface
-from ldtrefl.shading.surfaces import GROUP, Sighting, group_on, look_along, look_from
+from ldtrefl.shading.surfaces import GROUP, Sighting, look_along, look_from
 from ldtrefl.world.device_scene import DeviceScene
 from ldtrefl.world.records import ObjectRecord
 
@@ -166,7 +166,3 @@ def test_a_ray_that_misses_by_rounding_or_runs_along_the_triangle_stays_on_it() 
         weights = np.array([1.0 - sighting["u"] - sighting["v"], sighting["u"], sighting["v"]])
         assert (weights >= -1e-6).all() and (weights <= 1.0 + 1e-6).all()
         assert np.isfinite(surface["position"]).all() and np.isfinite(surface["normal"]).all()
-
-
-def test_a_group_is_as_large_as_a_vector_on_the_cpu() -> None:
-    assert group_on(launch.resolve_device("cpu")) == int(GROUP)
