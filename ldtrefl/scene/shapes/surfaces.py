@@ -30,14 +30,14 @@ def frozen(array: np.ndarray) -> np.ndarray:
     return array
 
 
-def grid_faces(columns: int, rows: int) -> np.ndarray:
+def grid_faces(columns: int, rows: int, *, flipped: bool = False) -> np.ndarray:
     """(2 * columns * rows, 3): faces of a grid of (columns + 1) x (rows + 1) vertices, row by row; counter-clockwise
-    seen from u x v."""
+    seen from u x v, or ``flipped``, from v x u."""
     corner = np.arange(columns, dtype=np.int32) + (columns + 1) * np.arange(rows, dtype=np.int32)[:, None]
     faces = np.empty((2, rows, columns, 3), np.int32)
     for half, steps in zip(faces, ((0, 1, columns + 2), (0, columns + 2, columns + 1)), strict=True):
         for k, step in enumerate(steps):
-            np.add(corner, step, out=half[:, :, k])
+            np.add(corner, step, out=half[:, :, 2 - k if flipped else k])
     return faces.reshape(-1, 3)
 
 
@@ -55,6 +55,7 @@ def parametric(
     *,
     wrap_u: bool = False,
     wrap_v: bool = False,
+    flipped: bool = False,
     normal: Surface | None = None,
 ) -> Mesh:
     """A surface over (u, v), with (u, v) as its texture coordinates.
@@ -65,13 +66,14 @@ def parametric(
         rows: segments along v.
         wrap_u: the surface closes along u. Both sides of the seam are computed from the same u, so they match.
         wrap_v: the same along v.
+        flipped: its outer side is that of v x u, not of u x v.
         normal: the vertex normals; without it they are made from the triangles.
     """
     i, j = np.arange(columns + 1), np.arange(rows + 1)[:, None]
     u = (i % columns if wrap_u else i) / columns
     v = (j % rows if wrap_v else j) / rows
     grid = position(u, v)
-    vertices, faces = grid.reshape(-1, 3), grid_faces(columns, rows)
+    vertices, faces = grid.reshape(-1, 3), grid_faces(columns, rows, flipped=flipped)
     if _has_doubled(grid):
         faces = without_collapsed(vertices, faces)
     uvs = np.stack(np.broadcast_arrays(i / columns, j / rows), -1).reshape(-1, 2)

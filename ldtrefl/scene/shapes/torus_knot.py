@@ -14,6 +14,9 @@ from ldtrefl.scene.shapes.surfaces import fitted, outwards, parametric, points
 STEP = 1e-4
 """Of the curve's parameter, for its tangent by central differences: small enough for a curve that turns 64 times."""
 
+FINE = 8
+"""Segments to a turn from which they run the curve's way for certain."""
+
 
 @shape(
     needed_bytes=lambda p, q, tube, segments: bytes_without_normals(2 * segments[0] * segments[1]),
@@ -45,4 +48,7 @@ def torus_knot(
         angle = 2 * np.pi * v[..., None]
         return curve(t) + 1.6 * tube * (np.cos(angle) * across + np.sin(angle) * binormal)
 
-    return outwards(fitted(parametric(position, *segments, wrap_u=True, wrap_v=True)))
+    # Along the curve and about it, against the clock seen from ahead: u x v points into the tube.
+    tube_of_knot = fitted(parametric(position, *segments, wrap_u=True, wrap_v=True, flipped=True))
+    # So few segments to a turn may run round the ring the other way.
+    return outwards(tube_of_knot) if segments[0] < FINE * max(p, q) else tube_of_knot
