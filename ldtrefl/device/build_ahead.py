@@ -41,11 +41,14 @@ _state = _State()
 
 
 def foresee(kernels: Iterable[wp.Kernel], threads: int) -> None:
-    """Say which kernels the CPU will need, those that take longest first, and how many threads may compile them."""
+    """Say which kernels the CPU will need, those that take longest first, and how many threads may compile them.
+
+    They come before what was foreseen earlier: whoever knows more of a scene names what takes longer.
+    """
     with _state.changed:
         new = [kernel for kernel in kernels if kernel not in _state.known]
         _state.known.update(new)
-        _state.waiting.update(dict.fromkeys(new))
+        _state.waiting = dict.fromkeys(new) | _state.waiting
         _state.most_helpers = min(threads - 1, MOST_HELPERS)
     _start_helpers()
 

@@ -116,8 +116,8 @@ class Ldt(RayMethod):
 
     def first_kernels(self) -> list[wp.Kernel]:
         """What searches for the rays, and what peels for the usual search."""
-        search, *others = kernels_of_rays(self.scene, TRACERS[self.config.search], self.skip)
-        return [search, *(TREE_KERNELS if self.config.search == "exact" else ()), *others, cull_runs]
+        of_rays = kernels_of_rays(self.scene, TRACERS[self.config.search], self.skip)
+        return [*of_rays, *(TREE_KERNELS if self.config.search == "exact" else ()), cull_runs]
 
     def camera_search(self, scene: DeviceScene, camera: Camera, stats: Stats) -> CameraSearch | None:
         """Meshes whose triangles are many and small in the image are searched by the exact search, unless maps are to
