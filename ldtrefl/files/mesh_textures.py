@@ -19,6 +19,9 @@ from ldtrefl.files.stored_picture import StoredPicture
 BYTES_A_PIXEL = 4 + 4 + 3
 """What Pillow takes to unpack a picture, what trimesh takes to copy it, and what is kept of it."""
 
+WITH_ALPHA = ("RGBA", "LA", "PA", "RGBa", "La")
+"""Pillow's modes of pictures with alpha."""
+
 ROWS_AT_ONCE = 256
 """Rows of a picture that are converted at a time."""
 
@@ -44,10 +47,10 @@ def take_memory_for_textures(materials: Iterable[object]) -> None:
             budget.take(width * height * BYTES_A_PIXEL, what, "a smaller texture")
 
 
-def stored_texture(picture: Image.Image) -> StoredPicture:
+def stored_texture(picture: Image.Image, *, with_alpha: bool = False) -> StoredPicture:
     """Convert to a stored picture: of uint8, or of float32 if the picture has more than 8 bits.
 
-    Alpha is left out, and colours are not multiplied by it. Equal pictures give the same object.
+    Alpha is kept ``with_alpha`` alone, and colours are not multiplied by it. Equal pictures give the same object.
 
     Raises:
         InputError: the picture is cut off or damaged.
@@ -55,6 +58,8 @@ def stored_texture(picture: Image.Image) -> StoredPicture:
     width, height = picture.size
     is_deep = picture.mode.startswith("I")  # Pillow would clip, not scale, its 16 bits
     stored = np.empty((height, width, 3), np.float32 if is_deep else np.uint8)
+    has_alpha = with_alpha and not is_deep and ("transparency" in picture.info or picture.mode in WITH_ALPHA)
+    alpha = np.empty((height, width), np.uint8) if has_alpha else None
     try:
         for top in range(0, height, ROWS_AT_ONCE):
             rows = picture.crop((0, top, width, min(top + ROWS_AT_ONCE, height)))
@@ -62,8 +67,12 @@ def stored_texture(picture: Image.Image) -> StoredPicture:
             if is_deep:
                 into[:] = linear_from_srgb(np.asarray(rows, np.float32)[..., None] / 65535.0)
             else:
-                into[:] = np.asarray(rows.convert("RGBA" if "transparency" in picture.info else "RGB"))[..., :3]
+                with_fourth = alpha is not None or "transparency" in picture.info
+                values = np.asarray(rows.convert("RGBA" if with_fourth else "RGB"))
+                into[:] = values[..., :3]
+                if alpha is not None:
+                    alpha[top : top + ROWS_AT_ONCE] = values[..., 3]
     except Exception as error:  # whatever a damaged picture provokes in a reader is the picture's fault
         raise InputError(f"a texture is cut off or damaged ({error})") from error
-    made = StoredPicture(stored)
+    made = StoredPicture(stored, alpha)
     return _shared.setdefault(made.key, made)

@@ -19,11 +19,15 @@ class StoredPicture:
 
     pixels: np.ndarray
     """(h, w, 3) uint8 or float32, row 0 at the top, which is v = 1."""
+    alpha: np.ndarray | None = None
+    """(h, w) uint8; None if it is opaque, or nobody asked for it."""
 
     def __post_init__(self) -> None:
         self.pixels.flags.writeable = False
+        if self.alpha is not None:
+            self.alpha.flags.writeable = False
 
     @functools.cached_property
     def key(self) -> str:
         """A hash of the pixels: pictures with the same key are the same. Made when it is first asked for."""
-        return content_key(self.pixels)
+        return content_key(self.pixels, self.alpha)

@@ -7,7 +7,6 @@ triangle's number means the same to the mesh, the ray caster and the layered dep
 from __future__ import annotations
 
 import functools
-import json
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,11 +14,11 @@ from numpy.typing import ArrayLike
 
 from ldtrefl.base.errors import InputError
 from ldtrefl.files.content_key import content_key
-from ldtrefl.files.stored_picture import StoredPicture
 from ldtrefl.scene.convexity import sides_with_returns
 from ldtrefl.scene.mesh_arrays import copied_faces, copied_vertices, fitted_vertices, is_immutable
 from ldtrefl.scene.normals import vertex_normals
 from ldtrefl.scene.outliers import split_outliers
+from ldtrefl.scene.surface_material import PLAIN, SurfaceMaterial
 
 MAX_TRIANGLES = 1 << 30
 """Triangles are numbered by int32, of which a fragment needs one bit for the way that its triangle faces."""
@@ -27,21 +26,24 @@ MAX_TRIANGLES = 1 << 30
 MOST_VERTICES = (1 << 31) - 1
 """Vertices are numbered by int32."""
 
+KEPT = (
+    *("vertices", "faces", "is_used", "bounds", "fit_bounds", "is_deformed"),
+    *("uvs", "second_uvs", "colors", "tangents", "parts"),
+)
+"""What a mesh keeps when it gets other normals."""
+
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A run of triangles with one colour and texture: a material of the mesh's file."""
+    """A run of triangles with one material of the mesh's file."""
 
     first_triangle: int = 0
-    color: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    """Linear base colour, times the scene's albedo."""
-    texture: StoredPicture | None = None
+    material: SurfaceMaterial = PLAIN
 
     @property
     def key(self) -> str:
         """A hash of all that it holds: parts with the same key are the same."""
-        texture = None if self.texture is None else self.texture.key
-        return content_key(json.dumps([self.first_triangle, *map(float, self.color)]), texture)
+        return content_key(str(self.first_triangle), self.material.key)
 
 
 class Mesh:
@@ -61,6 +63,10 @@ class Mesh:
         normals: ArrayLike | None = None,
         uvs: ArrayLike | None = None,
         parts: tuple[Part, ...] = (Part(),),
+        *,
+        second_uvs: ArrayLike | None = None,
+        colors: ArrayLike | None = None,
+        tangents: ArrayLike | None = None,
     ) -> None:
         given, corners = _coordinates(vertices), _indices(faces)
         for count, most, what in ((len(corners), MAX_TRIANGLES, "triangles"), (len(given), MOST_VERTICES, "vertices")):
@@ -83,6 +89,12 @@ class Mesh:
         """(n, 3) float32 shading normals, None if none were given."""
         self.uvs = self._of_vertices(uvs, 2, "uvs")
         """(n, 2) float32 texture coordinates, v = 0 at the bottom row; None if none were given."""
+        self.second_uvs = self._of_vertices(second_uvs, 2, "second_uvs")
+        """(n, 2) float32 other texture coordinates, for textures that ask for them."""
+        self.colors = self._of_vertices(colors, 4, "colors")
+        """(n, 4) float32 linear colours and alpha, times those of the materials; None if there are none."""
+        self.tangents = self._of_vertices(tangents, 4, "tangents")
+        """(n, 4) float32 the way of u along the surface, and the sign of the bitangent; None if none were given."""
         self.parts = parts
         self.fit_bounds = self.bounds
         """(2, 3) float64: the box by which an object's ``fit`` places the mesh; that before it was deformed."""
@@ -107,8 +119,7 @@ class Mesh:
             InputError: there are more or fewer normals than vertices.
         """
         mesh = Mesh.__new__(Mesh)
-        for name in ("vertices", "faces", "is_used", "bounds", "uvs", "parts", "fit_bounds", "is_deformed"):
-            setattr(mesh, name, getattr(self, name))
+        vars(mesh).update({name: getattr(self, name) for name in KEPT})
         mesh.stored_normals = mesh._of_vertices(normals, 3, "normals")
         return mesh
 
@@ -122,7 +133,8 @@ class Mesh:
         given = _coordinates(vertices)
         if len(given) != len(self.vertices):
             raise InputError(f"{len(given)} vertices in place of {len(self.vertices)}")
-        mesh = Mesh(given, self.faces, uvs=self.uvs, parts=self.parts)
+        looks = {"second_uvs": self.second_uvs, "colors": self.colors}
+        mesh = Mesh(given, self.faces, uvs=self.uvs, parts=self.parts, **looks)
         mesh.fit_bounds, mesh.is_deformed = self.fit_bounds, True
         return mesh
 
@@ -141,7 +153,8 @@ class Mesh:
     @functools.cached_property
     def key(self) -> str:
         """A hash of all that was given: meshes with the same key are the same. Made when it is first asked for."""
-        return content_key(self.surface_key, self.stored_normals, self.uvs, *(part.key for part in self.parts))
+        looks = (self.stored_normals, self.uvs, self.second_uvs, self.colors, self.tangents)
+        return content_key(self.surface_key, *looks, *(part.key for part in self.parts))
 
     @functools.cached_property
     def _split(self) -> tuple[np.ndarray, np.ndarray]:

@@ -9,7 +9,7 @@ import warp as wp
 
 from ldtrefl.base.errors import InputError
 from ldtrefl.files.stored_picture import StoredPicture
-from ldtrefl.scene.mesh import Mesh
+from ldtrefl.scene.mesh import Mesh, Part
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +36,7 @@ def appearance_of(mesh: Mesh, texture: StoredPicture | None, device: wp.Device) 
     Raises:
         InputError: there is a texture, and the mesh has no texture coordinates; or the textures have too many texels.
     """
-    textures = [part.texture if texture is None else texture for part in mesh.parts]
+    textures = [_base_picture(part) if texture is None else texture for part in mesh.parts]
     pools: dict[type, list[np.ndarray]] = {np.float32: [], np.uint8: []}
     places: dict[str, tuple[int, int, int, int]] = {}
     for picture in textures:
@@ -51,11 +51,17 @@ def appearance_of(mesh: Mesh, texture: StoredPicture | None, device: wp.Device) 
     table = [(0, 0, 0, 0) if picture is None else places[picture.key] for picture in textures]
     return Appearance(
         wp.array([p.first_triangle for p in mesh.parts], dtype=wp.int32, device=device),
-        wp.array([p.color for p in mesh.parts], dtype=wp.vec3, device=device),
+        wp.array([p.material.base_color for p in mesh.parts], dtype=wp.vec3, device=device),
         wp.array(table, dtype=wp.vec4i, device=device),
         _joined(pools[np.float32], wp.vec3, device),
         _joined(pools[np.uint8], wp.vec3ub, device),
     )
+
+
+def _base_picture(part: Part) -> StoredPicture | None:
+    """The picture of a part's base colour; None without one."""
+    texture = part.material.base_texture
+    return None if texture is None else texture.picture
 
 
 def _joined(pools: list[np.ndarray], dtype: type, device: wp.Device) -> wp.array:

@@ -31,7 +31,7 @@ def test_textures_of_a_glb(tmp_path: Path, mode: str, monkeypatch: pytest.Monkey
     picture = picture.convert("RGB").convert(mode) if mode in ("RGB", "P") else picture
     write_glb(tmp_path / "a.glb", picture)
     monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 100)
-    texture = ldtrefl.load_mesh(tmp_path / "a.glb").parts[0].texture
+    texture = ldtrefl.load_mesh(tmp_path / "a.glb").parts[0].material.base_texture.picture
     assert texture is not None and texture.pixels.dtype == np.uint8
     monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", None)
     np.testing.assert_array_equal(texture.pixels, np.asarray(picture.convert("RGB")))

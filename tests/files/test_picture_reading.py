@@ -21,6 +21,7 @@ from ldtrefl.files.stored_picture import StoredPicture
 from ldtrefl.scene import shapes
 from ldtrefl.scene.description import Camera, Environment, Material, Object, Scene
 from ldtrefl.scene.mesh import Mesh, Part
+from tests.part_materials import textured
 
 COLOR = (200, 100, 50)
 CLEAR = (*COLOR, 128)
@@ -197,7 +198,7 @@ def test_stored_pictures_are_shared_and_loaded_images_are_not(tmp_path: Path) ->
 def scene_of(texture: np.ndarray, environment: str) -> Scene:
     """A textured plane before a mirror ball under an environment's picture."""
     plane = shapes.make("plane", {})
-    mesh = Mesh(plane.vertices, plane.faces, None, plane.uvs, (Part(0, (1.0, 1.0, 1.0), StoredPicture(texture)),))
+    mesh = Mesh(plane.vertices, plane.faces, None, plane.uvs, (Part(0, textured(StoredPicture(texture))),))
     return Scene(
         camera=Camera(eye=(0, -5, 2), look_at=(0, 0, 0), width=48, height=32),
         environment=Environment(image=environment),

@@ -7,13 +7,14 @@ import ldtrefl
 from ldtrefl.files.stored_picture import StoredPicture
 from ldtrefl.scene import shapes
 from ldtrefl.scene.mesh import Part
+from tests.part_materials import textured
 
 
 def test_the_key_of_a_mesh_is_its_content() -> None:
     vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], float)
     faces, normals, uvs = [[0, 1, 2], [1, 2, 3]], np.eye(4, 3), np.eye(4, 2)
     pixels = [np.full((2, 2, 3), value, np.uint8) for value in (1, 1, 2)]
-    red, alike, other = (Part(0, (1.0, 0.0, 0.0), StoredPicture(entry)) for entry in pixels)
+    red, alike, other = (Part(0, textured(StoredPicture(entry), (1.0, 0.0, 0.0))) for entry in pixels)
     mesh = ldtrefl.Mesh(vertices, faces, normals, uvs, (red,))
     assert ldtrefl.Mesh(vertices.copy(), faces, normals, uvs, (alike,)).key == mesh.key
     assert ldtrefl.Mesh(vertices, faces, None, uvs, (red,)).with_normals(normals).key == mesh.key

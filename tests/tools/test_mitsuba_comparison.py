@@ -22,6 +22,8 @@ from ldtrefl.files.picture_reading import stored_picture
 from ldtrefl.scene import shapes
 from ldtrefl.scene.description import Camera, Environment, Light, Lighting, Material, Object, Scene
 from ldtrefl.scene.mesh import Part
+from ldtrefl.scene.surface_material import SurfaceMaterial
+from tests.part_materials import textured
 
 ROOT = Path(__file__).parent.parent.parent
 TOOL = ROOT / "tools" / "mitsuba_comparison.py"
@@ -35,7 +37,10 @@ def of_everything() -> Scene:
     """What differs between renderers most easily: an unusual ``up``, stretched and facetted mirrors, textures, parts of
     a mesh, and a sheet seen from behind."""
     quad = shapes.make("plane")
-    halves = (Part(0, (1.0, 0.5, 0.2)), Part(1, (0.3, 1.0, 0.6), stored_picture(BRICKS)))
+    halves = (
+        Part(0, SurfaceMaterial(base_color=(1.0, 0.5, 0.2))),
+        Part(1, textured(stored_picture(BRICKS), (0.3, 1.0, 0.6))),
+    )
     parted = ldtrefl.Mesh(quad.vertices, quad.faces, quad.normals, quad.uvs, halves)
     bricks, mirror = Material(albedo=(0.9, 0.8, 1.0), texture=BRICKS), (0.9, 0.7, 0.5)
     return Scene(

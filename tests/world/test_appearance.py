@@ -13,7 +13,9 @@ from ldtrefl.files.stored_picture import StoredPicture
 from ldtrefl.scene import shapes
 from ldtrefl.scene.description import Camera, Environment, Lighting, Material, Object, Scene
 from ldtrefl.scene.mesh import Mesh, Part
+from ldtrefl.scene.surface_material import SurfaceMaterial
 from ldtrefl.world.appearance import appearance_of
+from tests.part_materials import textured
 
 ROUNDING = 1e-6
 """Of float32: pixels see the middle of one colour, lit by 1."""
@@ -73,7 +75,12 @@ def test_textures_are_uploaded_once_and_by_kind() -> None:
     pixels = np.arange(18, dtype=np.uint8).reshape(2, 3, 3)
     first, alike = StoredPicture(pixels), StoredPicture(pixels.copy())
     floats = StoredPicture(np.linspace(0, 1, 12, dtype=np.float32).reshape(1, 4, 3))
-    parts = (Part(0, texture=first), Part(2, texture=floats), Part(4, texture=alike), Part(6, (0.0, 1.0, 0.0)))
+    parts = (
+        Part(0, textured(first)),
+        Part(2, textured(floats)),
+        Part(4, textured(alike)),
+        Part(6, SurfaceMaterial(base_color=(0.0, 1.0, 0.0))),
+    )
     made = appearance_of(Mesh(plane.vertices, plane.faces, None, plane.uvs, parts), None, launch.resolve_device("cpu"))
     assert made.part_first.numpy().tolist() == [0, 2, 4, 6] and made.part_color.numpy()[3].tolist() == [0, 1, 0]
     assert made.part_texture.numpy().tolist() == [[0, 3, 2, 1], [0, 4, 1, 0], [0, 3, 2, 1], [0, 0, 0, 0]]
@@ -84,6 +91,6 @@ def test_textures_are_uploaded_once_and_by_kind() -> None:
 def test_a_materials_texture_takes_the_place_of_all_parts_own() -> None:
     plane = shapes.make("plane", {"segments": 2})
     own, given = (StoredPicture(np.full((1, 1, 3), value, np.uint8)) for value in (7, 9))
-    mesh = Mesh(plane.vertices, plane.faces, None, plane.uvs, (Part(0, texture=own), Part(4)))
+    mesh = Mesh(plane.vertices, plane.faces, None, plane.uvs, (Part(0, textured(own)), Part(4)))
     made = appearance_of(mesh, given, launch.resolve_device("cpu"))
     assert made.texel_bytes.numpy().tolist() == [[9, 9, 9]] and (made.part_texture.numpy()[:, 1] == 1).all()

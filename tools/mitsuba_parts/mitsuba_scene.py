@@ -141,8 +141,9 @@ def _meshes_of(mi: Any, entry: Object, emitter: str) -> list[Any]:
     for part, first, end in zip(mesh.parts, firsts, [*firsts[1:], len(mesh.faces)], strict=True):
         properties = mi.Properties()
         properties["bsdf"] = mi.load_dict(_bsdf(entry))
-        picture = part.texture if entry.texture is None else entry.texture
-        color = np.multiply(material.albedo, part.color)
+        texture = part.material.base_texture
+        picture = texture.picture if entry.texture is None and texture is not None else entry.texture
+        color = np.multiply(material.albedo, part.material.base_color)
         properties["emitter"] = mi.load_dict(
             {"type": emitter, "radiance": _radiance(mi, color, np.asarray(material.emission), picture)}
         )

@@ -66,7 +66,7 @@ def _scene_info(scene: Scene, memory: int) -> None:
 
 def _mesh_info(mesh: Mesh) -> None:
     low, high = mesh.bounds
-    textures = sum(part.texture is not None for part in mesh.parts)
+    textures = sum(len(part.material.textures) for part in mesh.parts)
     say(f"{len(mesh.faces)} triangles, {len(mesh.vertices)} vertices")
     say(f"from {low.tolist()} to {high.tolist()}")
     say(f"parts: {len(mesh.parts)}, textures: {textures}, UVs: {'no' if mesh.uvs is None else 'yes'}")

@@ -16,19 +16,24 @@ import numpy as np
 from trimesh.exchange.load import mesh_formats
 
 from ldtrefl.base import budget
-from ldtrefl.base.errors import InputError
+from ldtrefl.base.errors import InputError, printable
 from ldtrefl.base.sharing import shared_while_used
-from ldtrefl.files.mesh_textures import take_memory_for_textures
 from ldtrefl.files.pillow_limit import no_pixel_limit
+from ldtrefl.scene.gltf.asset import Asset
+from ldtrefl.scene.gltf.pieces import placed_pieces
+from ldtrefl.scene.joining import joined_mesh, joining_bytes
 from ldtrefl.scene.mesh import Mesh
+from ldtrefl.scene.piece import Piece
 from ldtrefl.scene.readers.archives import ARCHIVES, archive_kind, mesh_files
-from ldtrefl.scene.readers.joining import distinct_materials, joined_mesh, joining_bytes
 from ldtrefl.scene.readers.memory import reading_bytes
-from ldtrefl.scene.readers.pieces import Piece, pieces_of
+from ldtrefl.scene.readers.pieces import pieces_of
 from ldtrefl.scene.readers.polygon_files import has_polygons
 from ldtrefl.scene.readers.trimesh_warnings import trimesh_warnings
 
 _log = logging.getLogger("ldtrefl")
+
+GLTF = ("glb", "gltf")
+"""Kinds that our own reader reads."""
 
 
 def load_mesh(path: str | Path) -> Mesh:
@@ -72,7 +77,6 @@ def _load_mesh(path: str, _modified: int, _size: int) -> Mesh:
     with budget.account(), np.errstate(all="ignore"):
         try:
             pieces, taken = _read_pieces(path)
-            take_memory_for_textures(distinct_materials(pieces)[0])
             # What was taken to read the file is free again.
             budget.take(max(0.0, joining_bytes(pieces) - taken), "its mesh")
             return joined_mesh(pieces)
@@ -87,6 +91,12 @@ def _read_pieces(path: str) -> tuple[list[Piece], float]:
     pieces: list[Piece] = []
     taken = 0.0
     for data, kind, beside in mesh_files(path):
+        if kind in GLTF:
+            asset = Asset.read(data, beside.get)
+            pieces += placed_pieces(asset)
+            for line in asset.not_shown():
+                _log.warning("%s: not shown: %s", path, printable(line))
+            continue
         polygons = has_polygons(data, kind)
         needed = reading_bytes(data, kind, polygons=polygons)
         budget.take(needed, f"reading it as {kind}")

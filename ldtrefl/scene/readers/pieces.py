@@ -7,7 +7,6 @@ scene, its normals by the inverse transpose, and a mirrored piece is wound the o
 from __future__ import annotations
 
 import io
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,29 +16,12 @@ from trimesh.exchange.load import mesh_loaders
 from trimesh.resolvers import Resolver
 
 from ldtrefl.scene.mesh import Mesh
+from ldtrefl.scene.piece import Piece, moved, unit_vectors
 from ldtrefl.scene.readers.ply_polygons import CORNER_LIST, FACES
 from ldtrefl.scene.readers.polygon_files import BYTE_ORDER_MARK, in_triangles
 from ldtrefl.scene.readers.polygons import triangles_of
+from ldtrefl.scene.readers.trimesh_materials import with_materials
 from ldtrefl.scene.welding import first_of_equals
-
-NEAR_UNIT = 1e-3
-"""How far from 1 the length of a stored normal may be, which is then left as it is; others are made unit vectors."""
-
-
-@dataclass(frozen=True, eq=False)
-class Piece:
-    """A run of triangles with one material, in the coordinates of the file's scene."""
-
-    vertices: np.ndarray
-    """(n, 3) float64."""
-    faces: np.ndarray
-    """(m, 3) int64."""
-    normals: np.ndarray | None
-    """(n, 3) float64, as stored."""
-    uvs: np.ndarray | None
-    """(n, 2) float32 texture coordinates, None without any that can be used."""
-    material: object | None
-    """trimesh's material."""
 
 
 def pieces_of(data: bytes, kind: str, beside: Resolver, *, polygons: bool) -> list[Piece]:
@@ -67,9 +49,10 @@ def pieces_of(data: bytes, kind: str, beside: Resolver, *, polygons: bool) -> li
     else:
         geometry = read["geometry"]
         nodes = read.get("graph") or [{"geometry": name, "frame_to": name} for name in geometry]
-    own = {name: piece for name, entry in geometry.items() if (piece := _piece(entry)) is not None}
+    found = {name: piece for name, entry in geometry.items() if (piece := _piece(entry)) is not None}
+    own = dict(zip(found, with_materials(list(found.values())), strict=True))
     placed = _placed([_node(node) for node in nodes], read.get("base_frame", "world"))
-    return [_moved(own[name], matrix) for name, matrix in placed if name in own]
+    return [moved(own[name], matrix) for name, matrix in placed if name in own]
 
 
 def _as_utf8(data: bytes) -> bytes:
@@ -82,8 +65,8 @@ def _as_utf8(data: bytes) -> bytes:
     return data
 
 
-def _piece(entry: dict[str, Any]) -> Piece | None:
-    """A geometry of the reader's as a piece; None if it has no triangles."""
+def _piece(entry: dict[str, Any]) -> tuple[Piece, object | None] | None:
+    """A geometry of the reader's as a piece, and trimesh's material of it; None if it has no triangles."""
     faces, vertices = entry.get("faces"), entry.get("vertices")
     if faces is None or vertices is None or len(faces) == 0:
         return None
@@ -97,7 +80,7 @@ def _piece(entry: dict[str, Any]) -> Piece | None:
     visual = entry.get("visual")
     normals = _stored_normals(entry.get("vertex_normals"), vertices)
     uvs = _stored_uvs(getattr(visual, "uv", None), len(vertices))
-    return Piece(vertices, faces, normals, uvs, getattr(visual, "material", None))
+    return Piece(vertices, faces, normals, uvs), getattr(visual, "material", None)
 
 
 def _stored_normals(stored: ArrayLike | None, vertices: np.ndarray) -> np.ndarray | None:
@@ -107,14 +90,8 @@ def _stored_normals(stored: ArrayLike | None, vertices: np.ndarray) -> np.ndarra
     """
     if stored is None or np.shape(stored) != vertices.shape:
         return None
-    normals = np.array(stored, np.float64)
-    normals[~np.isfinite(normals).all(axis=1)] = 0.0
-    lengths = np.sqrt(np.einsum("ij,ij->i", normals, normals))
-    if not lengths.any():
-        return None
-    is_far_from_unit = (np.abs(lengths - 1.0) > NEAR_UNIT) & (lengths > 0.0)
-    normals[is_far_from_unit] /= lengths[is_far_from_unit, None]
-    return normals
+    normals = unit_vectors(np.asarray(stored))
+    return normals if normals.any() else None
 
 
 def _stored_uvs(stored: ArrayLike | None, vertices: int) -> np.ndarray | None:
@@ -163,22 +140,6 @@ def _matrix(node: dict[str, Any]) -> np.ndarray:
 def _product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """The product of two matrices. Not by BLAS, whose threads go on spinning afterwards."""
     return np.einsum("ij,jk->ik", a, b)
-
-
-def _moved(piece: Piece, matrix: np.ndarray) -> Piece:
-    """The piece moved by a (4, 4) matrix: normals by the inverse transpose, and faces turned if it mirrors."""
-    if np.array_equal(matrix, np.eye(4)):
-        return piece
-    linear = matrix[:3, :3]
-    vertices = np.einsum("ni,ki->nk", piece.vertices, linear) + matrix[:3, 3]
-    # The determinant times the inverse transpose: it exists when the inverse does not.
-    cofactors = np.cross(linear[[1, 2, 0]], linear[[2, 0, 1]])
-    mirrors = float((linear[0] * cofactors[0]).sum()) < 0.0
-    normals = piece.normals
-    if normals is not None:
-        normals = _stored_normals(np.einsum("ni,ki->nk", normals, -cofactors if mirrors else cofactors), vertices)
-    faces = piece.faces[:, ::-1] if mirrors else piece.faces
-    return Piece(vertices, faces, normals, piece.uvs, piece.material)
 
 
 def _split_by_texture(read: dict[str, Any]) -> dict[str, Any]:

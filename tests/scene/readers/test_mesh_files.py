@@ -45,7 +45,7 @@ def test_real_meshes_load(real_mesh: Callable, name: str) -> None:
     lengths = np.linalg.norm(mesh.normals, axis=1)
     assert ((np.abs(lengths - 1) < 1e-3) | (lengths == 0)).all()
     assert (lengths[mesh.is_used] == 0).mean() < 0.01, "vertices of triangles without area alone have no normal"
-    assert (mesh.uvs is not None) == any(part.texture is not None for part in mesh.parts)
+    assert (mesh.uvs is not None) == any(part.material.base_texture is not None for part in mesh.parts)
 
 
 @pytest.mark.parametrize("kind", ["ply", "obj", "stl", "off", "glb"])

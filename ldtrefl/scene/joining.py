@@ -8,12 +8,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from ldtrefl.files.mesh_textures import stored_texture, texture_of
-from ldtrefl.files.stored_picture import StoredPicture
 from ldtrefl.scene.mesh import Mesh, Part
 from ldtrefl.scene.normals import split_by_side
-from ldtrefl.scene.readers.memory import BYTES_PER_TRIANGLE, BYTES_PER_VERTEX
-from ldtrefl.scene.readers.pieces import Piece
+from ldtrefl.scene.piece import Piece
+
+BYTES_PER_VERTEX = 160.0
+"""A vertex while pieces are joined, welded and smoothed, the mesh itself included; measured."""
+
+BYTES_PER_TRIANGLE = 90.0
+"""A triangle, likewise."""
 
 
 def joining_bytes(pieces: list[Piece]) -> float:
@@ -34,14 +37,8 @@ def joined_mesh(pieces: list[Piece]) -> Mesh:
     faces = np.concatenate([piece.faces for piece in pieces])
     if len(pieces) > 1:
         faces = faces + np.repeat(first_vertex[:-1], np.diff(first_triangle))[:, None]
-    uvs = _joined_uvs(pieces)
-    materials, numbers = distinct_materials(pieces)
-    colors_and_textures = [base_color_of(material) for material in materials]
-    parts = []
-    for first, piece, number in zip(first_triangle[:-1], pieces, numbers, strict=True):
-        color, texture = colors_and_textures[number]
-        parts.append(Part(first, color, texture if piece.uvs is not None else None))
-    mesh = Mesh(vertices, faces, None, uvs, tuple(parts))
+    parts = tuple(Part(first, piece.material) for first, piece in zip(first_triangle[:-1], pieces, strict=True))
+    mesh = Mesh(vertices, faces, None, _joined(pieces, "uvs", (0.0, 0.0)), parts, **_more_of_vertices(pieces))
     return _with_normals(mesh, pieces, first_vertex, first_triangle)
 
 
@@ -66,37 +63,26 @@ def _with_normals(mesh: Mesh, pieces: list[Piece], first_vertex: np.ndarray, fir
         return mesh.with_normals(normals)
     faces = mesh.faces.copy()
     faces[triangles] = split
-    return Mesh(mesh.vertices[sources], faces, normals, None if mesh.uvs is None else mesh.uvs[sources], mesh.parts)
+    uvs, *more = (None if of is None else of[sources] for of in (mesh.uvs, mesh.second_uvs, mesh.colors, mesh.tangents))
+    named = dict(zip(("second_uvs", "colors", "tangents"), more, strict=True))
+    return Mesh(mesh.vertices[sources], faces, normals, uvs, mesh.parts, **named)
 
 
-def _joined_uvs(pieces: list[Piece]) -> np.ndarray | None:
-    """(n, 2) float32 of all pieces, 0 for those without; None if none has any."""
-    found = [piece.uvs for piece in pieces]
-    if all(uv is None for uv in found):
+def _more_of_vertices(pieces: list[Piece]) -> dict[str, np.ndarray | None]:
+    """What vertices have beside positions, normals and texture coordinates."""
+    return {
+        "second_uvs": _joined(pieces, "second_uvs", (0.0, 0.0)),
+        "colors": _joined(pieces, "colors", (1.0, 1.0, 1.0, 1.0)),
+        "tangents": _joined(pieces, "tangents", (0.0, 0.0, 0.0, 0.0)),
+    }
+
+
+def _joined(pieces: list[Piece], name: str, otherwise: tuple[float, ...]) -> np.ndarray | None:
+    """(n, width) float32 of all pieces, ``otherwise`` for those without; None if none has any."""
+    found = [getattr(piece, name) for piece in pieces]
+    if all(values is None for values in found):
         return None
-    none = [np.zeros((len(piece.vertices), 2), np.float32) for piece in pieces]
-    return np.concatenate([zeros if uv is None else uv for uv, zeros in zip(found, none, strict=True)])
-
-
-def distinct_materials(pieces: list[Piece]) -> tuple[list[object | None], list[int]]:
-    """(trimesh's materials, each once; for each piece the number of its material)."""
-    # By identity: trimesh compares materials by hashes of their unpacked pictures.
-    numbers: dict[int, int] = {}
-    for piece in pieces:
-        numbers.setdefault(id(piece.material), len(numbers))
-    materials = {id(piece.material): piece.material for piece in pieces}
-    return list(materials.values()), [numbers[id(piece.material)] for piece in pieces]
-
-
-def base_color_of(material: object | None) -> tuple[tuple[float, float, float], StoredPicture | None]:
-    """A material's base colour, linear, and its texture. As in glTF factors are linear and textures sRGB."""
-    if material is None:
-        return (1.0, 1.0, 1.0), None
-    factor = getattr(material, "baseColorFactor", None)
-    color = (1.0, 1.0, 1.0)
-    if factor is not None:
-        scale = 255.0 if np.asarray(factor).dtype.kind in "iu" else 1.0
-        r, g, b = (float(channel) / scale for channel in np.asarray(factor)[:3])
-        color = (r, g, b)
-    picture = texture_of(material)
-    return color, None if picture is None else stored_texture(picture)
+    row = np.array(otherwise, np.float32)
+    rest = [np.broadcast_to(row, (len(piece.vertices), len(row))) for piece in pieces]
+    parts = [same if values is None else values for values, same in zip(found, rest, strict=True)]
+    return np.concatenate(parts).astype(np.float32, copy=False)
