@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
@@ -13,11 +14,37 @@ from ldtrefl.base.errors import InputError
 from ldtrefl.device.launch import set_threads
 from ldtrefl.files.regular_files import check_regular
 from ldtrefl.scene import shapes
+from ldtrefl.scene.description import Scene
+from ldtrefl.scene.load import load_scene
 from ldtrefl.scene.mesh import Mesh
 from ldtrefl.scene.readers import load_mesh
+from ldtrefl.scene.stages import STAGES
 from ldtrefl.scene.toml_text import parse_toml
 
-SceneFile = Annotated[Path, typer.Argument(metavar="SCENE", help="A scene file (TOML).")]
+SIZE = re.compile(r"([0-9]{1,6})[xX]([0-9]{1,6})")
+"""How ``--size`` is written."""
+
+SceneFile = Annotated[
+    Path, typer.Argument(metavar="FILE", help="A scene file (TOML), or a mesh file such as PLY, OBJ or GLB.")
+]
+On = Annotated[
+    str | None,
+    typer.Option("--on", metavar="STAGE", help=f"Put a mesh on a stage: {', '.join(STAGES)}."),
+]
+Up = Annotated[
+    str | None,
+    typer.Option(
+        "--up",
+        metavar="AXIS",
+        help="The axis of a mesh file that points up, such as y or -z; its kind's if not given.",
+    ),
+]
+Mirror = Annotated[
+    str | None, typer.Option("--mirror", metavar="self", help="'self' makes a mesh a mirror, on any stage.")
+]
+Size = Annotated[
+    str | None, typer.Option("--size", metavar="WxH", help="Pixels of the picture; the scene's own if not given.")
+]
 CacheFolder = Annotated[
     Path | None, typer.Option("--cache", metavar="DIR", help="Keep maps here; the user's cache folder if not given.")
 ]
@@ -51,6 +78,33 @@ def allow_memory(size: str | None) -> None:
     """
     budget.set_memory_limit(None if size is None else budget.size_of(size, "--memory"))
     budget.memory_limit()  # so that a wrong value in the environment is found before any work is done
+
+
+def scene_of(
+    file: Path, on: str | None = None, up: str | None = None, mirror: str | None = None, size: str | None = None
+) -> Scene:
+    """The scene of a scene file or a mesh file, by the options above.
+
+    Raises:
+        InputError: the file cannot be read, or an option is not allowed.
+    """
+    if mirror not in (None, "self"):
+        raise InputError(f"--mirror {mirror}: only 'self' is allowed")
+    return load_scene(file, on=on, up=up, mirror_self=mirror is not None, size=parsed_size(size))
+
+
+def parsed_size(size: str | None) -> tuple[int, int] | None:
+    """``"640x480"`` -> ``(640, 480)``.
+
+    Raises:
+        InputError: it is written in another way.
+    """
+    if size is None:
+        return None
+    numbers = SIZE.fullmatch(size)
+    if numbers is None:
+        raise InputError(f"--size {size}: expected WIDTHxHEIGHT, such as 768x512")
+    return int(numbers[1]), int(numbers[2])
 
 
 def parsed_settings(settings: list[str] | None) -> dict[str, object]:

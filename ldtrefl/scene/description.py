@@ -41,7 +41,7 @@ from ldtrefl.files.stored_picture import StoredPicture
 from ldtrefl.scene import shapes
 from ldtrefl.scene.layout import Layout
 from ldtrefl.scene.mesh import Mesh
-from ldtrefl.scene.placement import placement
+from ldtrefl.scene.placement import UpAxis, placement
 from ldtrefl.scene.readers import load_mesh
 
 MAX_SIDE = 16384
@@ -181,13 +181,15 @@ class Material:
 @refusing_in_one_line
 @dataclass(frozen=True, kw_only=True, config=CONFIG)
 class Object:
-    """A mesh or a shape, placed: fit, then scale, rotate, translate."""
+    """A mesh or a shape, placed: upright and fitted, then scale, rotate, translate."""
 
     name: str = ""
     mesh: Text | Mesh | None = None
     """A file that trimesh reads, or (in Python) a :class:`Mesh`."""
     shape: Text | None = None
     params: Mapping[str, object] = Field(default_factory=dict)
+    up_axis: UpAxis = "z"
+    """The axis of the mesh that is turned to +z."""
     fit: Positive | None = None
     """Centre the bounding box at 0 and scale its longest side to this, first."""
     scale: Scale = 1.0
@@ -281,7 +283,7 @@ class Object:
 
     @functools.cached_property
     def _world_from_object(self) -> np.ndarray:
-        return placement(self.geometry.fit_bounds, self.fit, self.scale, self.rotate, self.translate)
+        return placement(self.geometry.fit_bounds, self.fit, self.scale, self.rotate, self.translate, self.up_axis)
 
 
 @refusing_in_one_line

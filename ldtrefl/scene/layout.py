@@ -12,7 +12,7 @@ import numpy as np
 
 from ldtrefl.base.errors import InputError
 from ldtrefl.scene.mesh import Mesh
-from ldtrefl.scene.placement import placements, wrong_sizes
+from ldtrefl.scene.placement import UpAxis, placements, wrong_sizes
 from ldtrefl.scene.shared_geometries import HasGeometry, SharedGeometries
 
 CORNERS = np.array(np.meshgrid([0, 1], [0, 1], [0, 1])).reshape(3, -1).T
@@ -33,6 +33,9 @@ class _Placed(HasGeometry, Protocol):
 
     @property
     def translate(self) -> tuple[float, float, float]: ...
+
+    @property
+    def up_axis(self) -> UpAxis: ...
 
     def world_from_object(self) -> np.ndarray: ...
 
@@ -65,7 +68,8 @@ class Layout:
         scales = [entry.scale if isinstance(entry.scale, tuple) else (entry.scale,) * 3 for entry in objects]
         turns, positions = [entry.rotate for entry in objects], [entry.translate for entry in objects]
         bounds = np.array([mesh.fit_bounds for mesh in numbers]).reshape(-1, 2, 3)[mesh_of]
-        matrices = placements(bounds, fitted, _rows(scales, 3), _rows(turns, 4), _rows(positions, 3))
+        up_axes = [entry.up_axis for entry in objects]
+        matrices = placements(bounds, fitted, _rows(scales, 3), _rows(turns, 4), _rows(positions, 3), up_axes)
         for number in wrong_sizes(matrices, bounds):
             try:
                 objects[number].world_from_object()

@@ -1,4 +1,4 @@
-"""Reading a scene file (TOML) with its meshes and its pictures.
+"""Reading a scene file (TOML) with its meshes and its pictures; of a mesh file a scene is made (``mesh_scene.py``).
 
 Files that a scene names are looked for beside it, then in the folders of ``LDTREFL_MESH_PATH``. A fault is one line
 that names the scene file, the key, what is wrong and what is allowed.
@@ -20,12 +20,18 @@ from pydantic import TypeAdapter, ValidationError
 from ldtrefl.base import budget
 from ldtrefl.base.errors import InputError, first_fault
 from ldtrefl.scene.description import Environment, Object, Scene
+from ldtrefl.scene.framing import check_size
 from ldtrefl.scene.mesh import Mesh
+from ldtrefl.scene.mesh_scene import mesh_scene
 from ldtrefl.scene.places import split_places, standing_in
 from ldtrefl.scene.shared_geometries import SharedGeometries
+from ldtrefl.scene.standing import on_the_floor, split_standing
 from ldtrefl.scene.toml_text import read_toml
 
 MESH_PATH_VARIABLE = "LDTREFL_MESH_PATH"
+
+SCENE_ENDINGS = (".toml", "")
+"""Of the names of scene files. All others are taken for mesh files."""
 
 OBJECT_BYTES = 8 << 10
 """An object of a scene, without its mesh and pictures: what Python and the device keep of it."""
@@ -49,36 +55,79 @@ def _allowed_keys(kind: type, table: str = "") -> dict[str, list[str]]:
     return keys
 
 
-def load_scene(path: str | Path) -> Scene:
-    """Read a scene file (TOML), its meshes and its pictures.
+def load_scene(
+    path: str | Path,
+    *,
+    on: str | None = None,
+    up: str | None = None,
+    mirror_self: bool = False,
+    size: tuple[int, int] | None = None,
+) -> Scene:
+    """Read a scene file (TOML) with its meshes and its pictures, or make a scene of a mesh file.
+
+    A mesh file is shown in a three-quarter view that fits, in soft studio light. Its objects stay where they are, but
+    for being turned so that z is up, and come first among the scene's.
+
+    Args:
+        path: a scene file, whose name ends in ``.toml`` or has no ending, or else a mesh file.
+        on: of a mesh file: what it is put on. "studio", a matt floor; "mirror-floor"; "mirror-ball", a mirror ball
+            beside it; "chrome", a floor with coloured balls that it mirrors itself.
+        up: of a mesh file: its axis that points up, "x", "y", "z", "-x", "-y" or "-z". If not given, y of glTF and OBJ,
+            z of others.
+        mirror_self: of a mesh file: make it a mirror.
+        size: width and height of the picture in pixels, in place of the scene's own.
 
     Raises:
         InputError: one line naming the file, the key, what is wrong and what is allowed.
     """
     path = Path(path)
+    check_size(size)
+    if not is_scene_file(path):
+        with budget.account():
+            return mesh_scene(path, on, up, mirror_self=mirror_self, size=size)
+    for name, value in (("on", on), ("up", up), ("mirror_self", mirror_self or None)):
+        if value is not None:
+            raise InputError(f"{path}: '{name}' goes with a mesh file, this is a scene file")
+    scene = _load_toml(path)
+    if size is None:
+        return scene
+    return scene.with_camera(dataclasses.replace(scene.camera, width=size[0], height=size[1]))
+
+
+def is_scene_file(path: Path) -> bool:
+    """Whether a file is taken for a scene file, by its name."""
+    return path.suffix.lower() in SCENE_ENDINGS
+
+
+def _load_toml(path: Path) -> Scene:
+    """A scene file with all that it names."""
     tables = read_toml(path)
     try:
+        tables, standing = split_standing(tables)
         tables, places = split_places(tables)
         scene = _ADAPTER.validate_python(tables)
     except ValidationError as error:
         allowed = _allowed_keys(Scene)
-        allowed["object"].append("places")
+        allowed["object"] += ["place", "places"]
         raise first_fault(error, allowed).within(str(path)) from None
     except InputError as error:
         raise error.within(str(path)) from None
     with budget.account():
-        return _found(scene, places, path)
+        return _found(scene, places, standing, path)
 
 
-def _found(scene: Scene, places: dict[int, np.ndarray], path: Path) -> Scene:
-    """The scene with every file found and read, and its objects in their ``places``; a fault names the key."""
+def _found(scene: Scene, places: dict[int, np.ndarray], standing: frozenset[int], path: Path) -> Scene:
+    """The scene with every file found and read, its objects in their ``places`` and ``standing`` where they should; a
+    fault names the key."""
     count = len(scene.objects) - len(places) + sum(map(len, places.values()))
     _at(path, "object", lambda: budget.take(OBJECT_BYTES * count, f"a list of {count}"))
     shared = SharedGeometries()
     objects: list[Object] = []
+    lifted: list[int] = []
     for index, entry in enumerate(scene.objects):
         key = f"object[{index}]"
         found = _found_object(entry, key, path, shared)
+        lifted += [len(objects)] if index in standing else []
         if index in places:
             objects += _at(path, key, functools.partial(standing_in, found, places[index]))
         else:
@@ -91,7 +140,10 @@ def _found(scene: Scene, places: dict[int, np.ndarray], path: Path) -> Scene:
         for key, entry in zip(_keys(len(scene.objects), places), objects, strict=True):
             _at(path, key, entry.world_from_object)
         raise
-    return laid_out
+    if not lifted:
+        return laid_out
+    objects = _at(path, "object", lambda: on_the_floor(objects, lifted, np.array(scene.camera.up)))
+    return dataclasses.replace(laid_out, objects=tuple(objects))
 
 
 def _keys(tables: int, places: dict[int, np.ndarray]) -> Iterator[str]:

@@ -1,11 +1,27 @@
-"""Where objects stand: fit, then scale, rotate, translate. Many objects are placed at once."""
+"""Where objects stand: upright and fitted, then scale, rotate, translate. Many objects are placed at once."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal
 
 import numpy as np
 
 from ldtrefl.base.checked import LARGEST, SMALLEST
 from ldtrefl.base.errors import InputError
+
+UpAxis = Literal["x", "y", "z", "-x", "-y", "-z"]
+
+_UPRIGHT: dict[UpAxis, list[list[float]]] = {
+    "x": [[0, 0, -1], [0, 1, 0], [1, 0, 0]],
+    "y": [[1, 0, 0], [0, 0, -1], [0, 1, 0]],
+    "z": [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
+    "-x": [[0, 0, 1], [0, 1, 0], [-1, 0, 0]],
+    "-y": [[1, 0, 0], [0, 0, 1], [0, -1, 0]],
+    "-z": [[1, 0, 0], [0, -1, 0], [0, 0, -1]],
+}
+"""The rotations that turn an axis to +z: about x, or for x itself about y. What glTF calls the front, +z with y up,
+comes to -y."""
 
 _IDENTITY = np.eye(4)
 _QUARTERS = np.array([(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)])
@@ -18,6 +34,7 @@ def placement(
     scale: float | tuple[float, float, float],
     rotate: tuple[float, float, float, float],
     translate: tuple[float, float, float],
+    up_axis: UpAxis = "z",
 ) -> np.ndarray:
     """``world_from_object``, (4, 4) float64, of one object; :func:`placements` says what is what.
 
@@ -25,7 +42,8 @@ def placement(
         InputError: its size along an axis is not allowed.
     """
     fitted, scales = np.array([np.nan if fit is None else fit]), np.broadcast_to(scale, (1, 3)).astype(float)
-    matrices = placements(bounds[None], fitted, scales, np.array([rotate], float), np.array([translate], float))
+    turn, offset = np.array([rotate], float), np.array([translate], float)
+    matrices = placements(bounds[None], fitted, scales, turn, offset, [up_axis])
     if len(wrong_sizes(matrices, bounds[None])):
         (side,), sizes = _longest_sides(bounds[None]), _sizes(matrices, bounds[None])
         given = "" if fit is None else f"fit {fit:g}, "
@@ -37,7 +55,12 @@ def placement(
 
 
 def placements(
-    bounds: np.ndarray, fit: np.ndarray, scale: np.ndarray, rotate: np.ndarray, translate: np.ndarray
+    bounds: np.ndarray,
+    fit: np.ndarray,
+    scale: np.ndarray,
+    rotate: np.ndarray,
+    translate: np.ndarray,
+    up_axes: Sequence[UpAxis],
 ) -> np.ndarray:
     """``world_from_object`` of n objects, (n, 4, 4) float64; some may not be allowed (:func:`wrong_sizes`).
 
@@ -47,6 +70,7 @@ def placements(
         scale: (n, 3), a factor for each axis.
         rotate: (n, 4), axis and degrees.
         translate: (n, 3), in the world.
+        up_axes: n axes of the meshes that become +z, before the scale.
     """
     low, high = bounds[:, 0], bounds[:, 1]
     side = _longest_sides(bounds)
@@ -54,6 +78,9 @@ def placements(
         matrices = _identities(len(fit))
         np.multiply(_rotations(rotate), scale[:, None, :], out=matrices[:, :3, :3])
         matrices[:, :3, 3] = translate
+        turned = [number for number, axis in enumerate(up_axes) if axis != "z"]
+        if turned:
+            matrices[turned, :3, :3] @= np.array([_UPRIGHT[up_axes[number]] for number in turned])
         fitted = np.flatnonzero(~np.isnan(fit))
         factor = np.divide(fit, side, out=np.ones_like(fit), where=side > 0.0)[fitted]
         centring = _translations(-(low + (high - low) / 2)[fitted])

@@ -1,10 +1,12 @@
 """Where an object stands."""
 
+import typing
+
 import numpy as np
 import pytest
 
 import ldtrefl
-from ldtrefl.scene.placement import placement, placements, wrong_sizes
+from ldtrefl.scene.placement import UpAxis, placement, placements, wrong_sizes
 
 BOUNDS = np.array([[1.0, 2.0, 3.0], [2.0, 4.0, 7.0]])
 STILL = (0.0, 0.0, 1.0, 0.0)
@@ -30,6 +32,37 @@ def test_quarter_turns_only_permute_axes(degrees: float) -> None:
     assert set(np.abs(matrix).ravel()) == {0.0, 1.0}
 
 
+@pytest.mark.parametrize(
+    ("up_axis", "axis"),
+    [
+        ("x", (1, 0, 0)),
+        ("y", (0, 1, 0)),
+        ("z", (0, 0, 1)),
+        ("-x", (-1, 0, 0)),
+        ("-y", (0, -1, 0)),
+        ("-z", (0, 0, -1)),
+    ],
+)
+def test_the_axis_that_points_up_comes_to_z_by_a_rotation(up_axis: UpAxis, axis: tuple[int, int, int]) -> None:
+    turn = placement(BOUNDS, None, 1.0, STILL, (0.0, 0.0, 0.0), up_axis)[:3, :3]
+    assert (turn @ axis).tolist() == [0.0, 0.0, 1.0] and np.linalg.det(turn) == 1.0
+    np.testing.assert_array_equal(turn @ turn.T, np.eye(3))
+
+
+def test_with_y_up_the_front_of_gltf_comes_to_minus_y() -> None:
+    """glTF 2.0, 3.4: +y is up and the front of an asset faces +z."""
+    turn = placement(BOUNDS, None, 1.0, STILL, (0.0, 0.0, 0.0), "y")[:3, :3]
+    assert (turn @ [0, 0, 1]).tolist() == [0.0, -1.0, 0.0] and (turn @ [1, 0, 0]).tolist() == [1.0, 0.0, 0.0]
+
+
+def test_upright_comes_before_the_scale_and_with_the_fit() -> None:
+    """Of the box from (1, 2, 3) to (2, 4, 7) the longest side is along z: with y up it lies along y, and the box's
+    middle at 0. What was y is stretched as z."""
+    matrix = placement(BOUNDS, 2.0, (1.0, 1.0, 3.0), STILL, (0.0, 0.0, 5.0), "y")
+    assert placed([1.5, 3.0, 5.0], matrix) == [0.0, 0.0, 5.0]
+    assert placed([2.0, 4.0, 7.0], matrix) == [0.25, -1.0, 5.0 + 3.0 * 0.5]
+
+
 def test_any_turn_keeps_lengths_and_its_axis() -> None:
     axis = np.array([1.0, -2.0, 3.0])
     turn = placement(BOUNDS, None, 1.0, (*axis.tolist(), 33.0), (0.0, 0.0, 0.0))[:3, :3]
@@ -51,11 +84,12 @@ def test_many_are_placed_as_each_alone_and_wrong_ones_are_found() -> None:
     fit = np.where(rng.random(count) < 0.5, np.nan, rng.uniform(0.5, 2.0, count))
     scale, translate = rng.uniform(0.5, 2.0, (count, 3)), rng.normal(size=(count, 3))
     rotate = np.concatenate([rng.normal(size=(count, 3)), rng.choice([0.0, 90.0, 33.0, -400.0], (count, 1))], axis=1)
-    matrices = placements(bounds, fit, scale, rotate, translate)
+    up_axes = [typing.get_args(UpAxis)[k % 6] for k in range(count)]
+    matrices = placements(bounds, fit, scale, rotate, translate, up_axes)
     for k in range(count):
         given = None if np.isnan(fit[k]) else float(fit[k])
         values = [tuple(row[k].tolist()) for row in (scale, rotate, translate)]
-        np.testing.assert_array_equal(matrices[k], placement(bounds[k], given, *values))
+        np.testing.assert_array_equal(matrices[k], placement(bounds[k], given, *values, up_axes[k]))
     assert len(wrong_sizes(matrices, bounds)) == 0
     scale[7, 1], scale[30] = 1e-20, 1e20
-    assert wrong_sizes(placements(bounds, fit, scale, rotate, translate), bounds).tolist() == [7, 30]
+    assert wrong_sizes(placements(bounds, fit, scale, rotate, translate, up_axes), bounds).tolist() == [7, 30]

@@ -9,7 +9,19 @@ from typing import Annotated
 import typer
 
 from ldtrefl.base.errors import InputError, printable
-from ldtrefl.cli.options import Device, Memory, SceneFile, Threads, parsed_settings, use_resources
+from ldtrefl.cli.options import (
+    Device,
+    Memory,
+    Mirror,
+    On,
+    SceneFile,
+    Size,
+    Threads,
+    Up,
+    parsed_settings,
+    scene_of,
+    use_resources,
+)
 from ldtrefl.cli.printing import say, stage_times
 from ldtrefl.cli.progress import progress_bar
 from ldtrefl.compare.bounces import bounce_table
@@ -22,7 +34,6 @@ from ldtrefl.frame.result import Frame
 from ldtrefl.methods import find_method
 from ldtrefl.renderer import Renderer
 from ldtrefl.scene.description import Scene
-from ldtrefl.scene.load import load_scene
 
 PLACE_IN_HELP = 20
 
@@ -38,22 +49,26 @@ def compare(
     methods: Annotated[str, typer.Option(help="Method names, comma-separated.")] = "ldt,envmap",
     reference: Annotated[str, typer.Option(help="The method that counts as the truth.")] = "bvh",
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Folder for images; SCENE's name + '-compare' if not given.")
+        Path | None, typer.Option("-o", "--output", help="Folder for images; FILE's name + '-compare' if not given.")
     ] = None,
     settings: Annotated[
         list[str] | None, typer.Option("--set", metavar="METHOD.OPTION=VALUE", help="An option of one method.")
     ] = None,
+    on: On = None,
+    up: Up = None,
+    mirror: Mirror = None,
+    size: Size = None,
     device: Device = None,
     threads: Threads = None,
     memory: Memory = None,
 ) -> None:
-    """Render a scene by several methods; print errors and write images and difference pictures."""
+    """Render a scene, or a mesh, by several methods; print errors and write images and difference pictures."""
     use_resources(memory, threads)
     foresee_a_frame(device)
     names = [name.strip() for name in methods.split(",") if name.strip()]
     options = _options_by_method(settings, [reference, *names])
     folder = writable_folder(output or Path(scene.stem + "-compare"), make=True)
-    loaded = load_scene(scene)
+    loaded = scene_of(scene, on, up, mirror, size)
     rows: dict[str, Row] = {}
     with progress_bar():
         _, truth = timed_frame(loaded, reference, device, options[reference])

@@ -1,4 +1,4 @@
-"""``ldtrefl render``: a scene to a picture."""
+"""``ldtrefl render``: a scene, or a mesh, to a picture."""
 
 from __future__ import annotations
 
@@ -13,7 +13,20 @@ import typer
 
 from ldtrefl.base import budget
 from ldtrefl.base.errors import InputError
-from ldtrefl.cli.options import CacheFolder, Device, Memory, SceneFile, Threads, parsed_settings, use_resources
+from ldtrefl.cli.options import (
+    CacheFolder,
+    Device,
+    Memory,
+    Mirror,
+    On,
+    SceneFile,
+    Size,
+    Threads,
+    Up,
+    parsed_settings,
+    scene_of,
+    use_resources,
+)
 from ldtrefl.cli.printing import say, stage_times
 from ldtrefl.cli.progress import progress_bar
 from ldtrefl.files.map_cache import MapCache, keep_maps_in
@@ -21,7 +34,8 @@ from ldtrefl.files.picture_writing import check_writable, save_image
 from ldtrefl.frame.first_frame import foresee_a_frame
 from ldtrefl.methods import find_method
 from ldtrefl.renderer import Renderer
-from ldtrefl.scene.load import load_scene
+from ldtrefl.scene.load import is_scene_file
+from ldtrefl.scene.scene_text import check_scene_writable, save_scene
 
 PLACE_IN_HELP = 10
 
@@ -32,7 +46,15 @@ app = typer.Typer()
 def render(
     scene: SceneFile,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="PNG or EXR; SCENE's name with .png if not given.")
+        Path | None, typer.Option("-o", "--output", help="PNG or EXR; FILE's name with .png if not given.")
+    ] = None,
+    on: On = None,
+    up: Up = None,
+    mirror: Mirror = None,
+    size: Size = None,
+    scene_file: Annotated[
+        Path | None,
+        typer.Option("--save-scene", metavar="TOML", help="Write what a mesh is put on as a scene file."),
     ] = None,
     method: Annotated[str | None, typer.Option(help="See `ldtrefl methods`; the scene's own if not given.")] = None,
     settings: Annotated[
@@ -46,14 +68,20 @@ def render(
     threads: Threads = None,
     memory: Memory = None,
 ) -> None:
-    """Render a scene to a picture."""
+    """Render a scene, or a mesh, to a picture."""
     use_resources(memory, threads)
     foresee_a_frame(device)
     path = check_writable(output or Path(scene.stem + ".png"))
     if cache is not None and no_cache:
         raise InputError("--cache and --no-cache exclude each other")
+    if scene_file is not None:
+        check_scene_writable(scene_file)
+        if is_scene_file(scene):
+            raise InputError(f"--save-scene goes with a mesh file, {scene} is a scene file")
     with _maps_kept(cache, no_cache), budget.account():
-        loaded = load_scene(scene)
+        loaded = scene_of(scene, on, up, mirror, size)
+        if scene_file is not None:
+            save_scene(scene_file, loaded)
         options = parsed_settings(settings)
         # Before they are passed on by name: one may be called as a parameter of Renderer is.
         find_method(loaded.reflection.method if method is None else method).configured(options)

@@ -1,0 +1,99 @@
+"""A scene written as a scene file makes the same picture."""
+
+import dataclasses
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import ldtrefl
+from ldtrefl import Environment, Light, Material, Mesh, Object, Reflection, Scene
+from ldtrefl.scene.composed import composed
+from ldtrefl.scene.scene_text import COMMENTS, check_scene_writable, save_scene, scene_text
+from ldtrefl.scene.stages import STAGES
+
+OBJ = "v 0 0 0\nv 1 0 0\nv 0 2 0\nv 0 0 3\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+
+
+def on_disk(folder: Path, name: str = "corner.obj") -> str:
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / name).write_text(OBJ)
+    return str(folder / name)
+
+
+@pytest.mark.parametrize("on", [None, *STAGES])
+def test_what_is_written_is_read_as_the_same(tmp_path: Path, on: str | None) -> None:
+    """Every value to the last bit, and so the picture's too."""
+    mesh = on_disk(tmp_path / "meshes")
+    scene = composed((Object(name="thing", mesh=mesh, up_axis="y", scale=1.0 / 3.0),), on, size=(36, 24))
+    (tmp_path / "scenes").mkdir()
+    path = tmp_path / "scenes" / "made.toml"
+    save_scene(path, scene)
+    again = ldtrefl.load_scene(path)
+    assert 'mesh = "../meshes/corner.obj"' in path.read_text()
+    objects = (dataclasses.replace(again.objects[0], mesh=mesh), *again.objects[1:])
+    assert dataclasses.replace(again, objects=objects) == scene
+    np.testing.assert_array_equal(ldtrefl.render(again).image, ldtrefl.render(scene).image)
+
+
+def test_all_that_a_scene_may_hold_is_written(tmp_path: Path) -> None:
+    ldtrefl.save_image(tmp_path / "sky.exr", np.ones((2, 4, 3)))
+    ldtrefl.save_image(tmp_path / "wood.png", np.ones((2, 2, 3)))
+    scene = Scene(
+        camera=ldtrefl.Camera(eye=(0.0, -5.0, 1e-7), look_at=(0.0, 0.0, 1e15), up=(0.0, 1.0, 0.0)),
+        environment=Environment(image=str(tmp_path / "sky.exr")),
+        lights=(Light(kind="point", position=(1.0, 2.0, 3.0), intensity=4.0),),
+        objects=(
+            Object(shape="torus_knot", params={"p": 3, "segments": [60, 8]}, fit=2.0, smooth=False),
+            Object(shape="box", scale=(1.0, 2.0, 3.0), material=Material(texture=str(tmp_path / "wood.png"))),
+            Object(shape="sphere", material=Material(albedo=0.0, mirror=0.5, fresnel=True)),
+            Object(shape="sphere", material=Material(albedo=0.25, mirror=0.5)),
+        ),
+        reflection=Reflection(method="bvh", max_bounces=2),
+    )
+    save_scene(tmp_path / "all.toml", scene)
+    again = ldtrefl.load_scene(tmp_path / "all.toml")
+    assert again.objects[1].texture is scene.objects[1].texture is not None
+    assert str(again.environment.image) == str(tmp_path / "sky.exr")
+    assert again == scene
+
+
+@pytest.mark.parametrize("name", ['quo"te.obj', "back\\slash.obj", "Straße 🙂.obj", "tab\there.obj", "bell\x7f.obj"])
+def test_names_of_any_kind_are_written(tmp_path: Path, name: str) -> None:
+    scene = composed((Object(name=name, mesh=on_disk(tmp_path, name)),), None)
+    save_scene(tmp_path / "made.toml", scene)
+    assert ldtrefl.load_scene(tmp_path / "made.toml").objects[0].name == name
+
+
+def test_a_key_is_explained_where_it_comes_first() -> None:
+    scene = composed((Object(shape="sphere"),), "mirror-ball")
+    text = scene_text(scene, Path("made.toml"))
+    for comment in ("what a ray sees that hits nothing", "the way the light travels", "specular reflectance"):
+        assert text.count(comment) == 1
+    written = tomllib.loads(text)
+    for key in COMMENTS:
+        table, _, name = key.rpartition(".")
+        assert table == "" or table in ("camera", "lighting", "light", "object", "object.material"), name
+    assert [entry.get("name") for entry in written["object"]][1:3] == ["floor", "mirror ball"]
+
+
+def test_defaults_are_left_out() -> None:
+    text = scene_text(composed((Object(shape="sphere"),), None), Path("made.toml"))
+    assert tomllib.loads(text)["object"] == [{"shape": "sphere"}]
+
+
+def test_a_mesh_that_is_in_no_file_is_refused(tmp_path: Path) -> None:
+    mesh = Mesh([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    with pytest.raises(ldtrefl.InputError, match=r"made\.toml: the mesh of the object 'mine' is in no file"):
+        save_scene(tmp_path / "made.toml", composed((Object(name="mine", mesh=mesh),), None))
+    assert not list(tmp_path.iterdir())
+
+
+def test_where_it_cannot_be_written_is_said(tmp_path: Path) -> None:
+    for name, message in (("a.txt", r"name ends in \.toml"), ("none/a.toml", "does not exist"), (".", "ends in")):
+        with pytest.raises(ldtrefl.InputError, match=message):
+            check_scene_writable(tmp_path / name)
+    (tmp_path / "b.toml").mkdir()
+    with pytest.raises(ldtrefl.InputError, match="is a folder"):
+        check_scene_writable(tmp_path / "b.toml")
