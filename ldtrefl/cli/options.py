@@ -25,7 +25,7 @@ SIZE = re.compile(r"([0-9]{1,6})[xX]([0-9]{1,6})")
 """How ``--size`` is written."""
 
 SceneFile = Annotated[
-    Path, typer.Argument(metavar="FILE", help="A scene file (TOML), or a mesh file such as PLY, OBJ or GLB.")
+    Path, typer.Argument(metavar="SCENE|MESH", help="A scene file (TOML), or a mesh file such as PLY, OBJ or GLB.")
 ]
 On = Annotated[
     str | None,

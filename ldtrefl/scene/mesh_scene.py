@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import typing
+from contextlib import suppress
 from pathlib import Path
 
 from ldtrefl.base.errors import unknown_name
+from ldtrefl.files.regular_files import check_regular
 from ldtrefl.scene.composed import composed
 from ldtrefl.scene.description import Object, Scene
 from ldtrefl.scene.placement import UpAxis
@@ -28,6 +30,8 @@ def mesh_scene(
     Raises:
         InputError: the file cannot be read, or an option is not allowed.
     """
+    with suppress(OSError):  # a missing file: its reader says so
+        check_regular(path, "a mesh file")
     if up is not None and up not in typing.get_args(UpAxis):
         raise unknown_name("axis", up, typing.get_args(UpAxis))
     return composed(objects_of_file(path, typing.cast(UpAxis | None, up)), on, mirror_self=mirror_self, size=size)

@@ -5,7 +5,8 @@ from pathlib import Path
 import pytest
 
 from ldtrefl.base.errors import InputError
-from ldtrefl.cli.options import mesh_or_shape, parsed_settings
+from ldtrefl.cli.options import mesh_or_shape, parsed_settings, parsed_size, scene_of
+from tests.conftest import SMALL_SCENE
 
 
 def test_settings_are_values_of_toml_or_words() -> None:
@@ -36,3 +37,30 @@ def test_a_file_hides_the_shape_of_its_name(tmp_path: Path, monkeypatch: pytest.
     (tmp_path / "torus").write_text("no mesh")
     with pytest.raises(InputError, match="torus"):
         mesh_or_shape("torus")
+
+
+def test_a_size_is_width_and_height() -> None:
+    assert parsed_size("640x480") == (640, 480) == parsed_size("640X480") and parsed_size(None) is None
+
+
+@pytest.mark.parametrize("size", ["640", "x480", "640x", "-1x4", "6.5x4", "640x480x3", "640 x 480", "1" * 5000 + "x1"])
+def test_another_way_to_write_a_size_is_refused(size: str) -> None:
+    with pytest.raises(InputError, match="expected WIDTHxHEIGHT, such as 768x512"):
+        parsed_size(size)
+
+
+def test_a_scene_file_takes_a_size_and_nothing_else(tmp_path: Path) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text(SMALL_SCENE)
+    camera = scene_of(path, size="10x20").camera
+    assert (camera.width, camera.height, camera.eye) == (10, 20, (0.0, -5.0, 1.0))
+    for options in ({"on": "studio"}, {"up": "y"}, {"mirror": "self"}):
+        with pytest.raises(InputError, match=r"scene\.toml: '\w+' goes with a mesh file, this is a scene file"):
+            scene_of(path, **options)
+    with pytest.raises(InputError, match=r"size: should be width and height, .* got \(99999, 2\)"):
+        scene_of(path, size="99999x2")
+
+
+def test_only_the_mesh_itself_can_be_made_a_mirror(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="--mirror all: only 'self' is allowed"):
+        scene_of(tmp_path / "a.ply", mirror="all")

@@ -49,7 +49,8 @@ def compare(
     methods: Annotated[str, typer.Option(help="Method names, comma-separated.")] = "ldt,envmap",
     reference: Annotated[str, typer.Option(help="The method that counts as the truth.")] = "bvh",
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Folder for images; FILE's name + '-compare' if not given.")
+        Path | None,
+        typer.Option("-o", "--output", help="Folder for images; the file's name + '-compare' if not given."),
     ] = None,
     settings: Annotated[
         list[str] | None, typer.Option("--set", metavar="METHOD.OPTION=VALUE", help="An option of one method.")

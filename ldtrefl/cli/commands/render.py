@@ -35,6 +35,7 @@ from ldtrefl.frame.first_frame import foresee_a_frame
 from ldtrefl.methods import find_method
 from ldtrefl.renderer import Renderer
 from ldtrefl.scene.load import is_scene_file
+from ldtrefl.scene.mesh_scene import usual_up_axis
 from ldtrefl.scene.scene_text import check_scene_writable, save_scene
 
 PLACE_IN_HELP = 10
@@ -46,7 +47,7 @@ app = typer.Typer()
 def render(
     scene: SceneFile,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="PNG or EXR; FILE's name with .png if not given.")
+        Path | None, typer.Option("-o", "--output", help="PNG or EXR; the file's name with .png if not given.")
     ] = None,
     on: On = None,
     up: Up = None,
@@ -90,6 +91,8 @@ def render(
             save_image(path, frame.image)
     total = sum(frame.stats.seconds.values())
     say(f"{path}: {frame.image.shape[1]} x {frame.image.shape[0]} in {total:.2f} s", stage_times(frame))
+    if up is None and not is_scene_file(scene):
+        say(f"its {usual_up_axis(scene)} axis points up; --up names another")
     if stats:
         for line in _in_words(frame.stats.counters):
             say(line)

@@ -56,3 +56,11 @@ def test_a_frame_that_is_timed_compiles_nothing_and_keeps_nothing(tmp_path: Path
     renderer, frame = timed_frame(ldtrefl.load_scene(tmp_path / "scene.toml"), "ldt")
     assert "frames_kept" not in frame.stats.counters and frame.stats.counters["objects_peeled"] == 1
     assert np.array_equal(renderer.render().image, frame.image)
+
+
+def test_a_mesh_is_compared_on_a_stage(run: Callable[..., Done], scene_folder: Path) -> None:
+    (scene_folder / "thing.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 2 0\nv 0 0 3\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
+    done = run("compare", "thing.obj", "--on", "mirror-ball", "--size", "48x32", "--methods", "ldt")
+    assert done.status == 0 and not done.errors, done
+    report = json.loads((scene_folder / "thing-compare" / "compare.json").read_text())
+    assert report["ldt"]["ssim"] > 0.99
