@@ -21,8 +21,11 @@ MAGIC = b"glTF"
 JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 HEADER, CHUNK_HEADER = 12, 8
 
-JSON_BYTES = 60.0
-"""Bytes that a byte of the JSON takes: its nodes and primitives become objects."""
+TEXT_BYTES = 4.0
+"""Bytes that a byte of the JSON takes: it is decoded, and data in it are decoded once more."""
+
+VALUE_BYTES = 250.0
+"""Bytes that a value of the JSON takes: a name and a number, and what is made of it."""
 
 DEEPEST = 200
 """Lists and tables in one another in the JSON, at most: Python's own limit would be met at some thousand."""
@@ -57,7 +60,8 @@ class Document:
             InputError: it is no glTF 2.0.
         """
         text, self._binary = _chunks(data) if is_glb(data) else (data, None)
-        budget.take(JSON_BYTES * len(text), "its JSON")
+        values = text.count(b",") + text.count(b"{") + text.count(b"[")
+        budget.take(TEXT_BYTES * len(text) + VALUE_BYTES * values, "its JSON")
         self.root = _parsed(text)
         self._beside = beside
         self._buffers: dict[int, bytes] = {}
