@@ -22,7 +22,7 @@ def compete(
     places_out: wp.array(dtype=wp.int32),
     sums_out: wp.array(dtype=wp.int64),
 ):
-    """Each thread offers its item's value to one of two places, takes a place in a list, and adds to one of two sums."""
+    """Each thread offers its value to one of two places, takes a place in a list, and adds to one of two sums."""
     i = first + wp.tid()
     keep_largest(largest_out, i % 2, values[i])
     places_out[i] = take_place(count_out)
