@@ -19,9 +19,11 @@ from pydantic import TypeAdapter, ValidationError
 
 from ldtrefl.base import budget
 from ldtrefl.base.errors import InputError, first_fault
-from ldtrefl.scene.description import Environment, Object, Scene
+from ldtrefl.scene.description import Camera, Environment, Object, Scene
+from ldtrefl.scene.includes import Include, read_includes, split_includes, up_axis, with_includes
 from ldtrefl.scene.mesh import Mesh
 from ldtrefl.scene.places import split_places, standing_in
+from ldtrefl.scene.scene_parts import SceneParts
 from ldtrefl.scene.shared_geometries import SharedGeometries
 from ldtrefl.scene.toml_text import read_toml
 
@@ -59,6 +61,9 @@ def load_scene(path: str | Path) -> Scene:
     tables = read_toml(path)
     try:
         tables, places = split_places(tables)
+        tables, includes = split_includes(tables)
+        with budget.account():
+            included = _included(tables, includes, path)
         scene = _ADAPTER.validate_python(tables)
     except ValidationError as error:
         allowed = _allowed_keys(Scene)
@@ -67,10 +72,32 @@ def load_scene(path: str | Path) -> Scene:
     except InputError as error:
         raise error.within(str(path)) from None
     with budget.account():
-        return _found(scene, places, path)
+        return _found(scene, places, path, included, includes)
 
 
-def _found(scene: Scene, places: dict[int, np.ndarray], path: Path) -> Scene:
+def _included(tables: dict[str, Any], includes: list[Include], path: Path) -> list[SceneParts]:
+    """What the scene file includes. Where it has no camera, ``tables`` is given the first that there is."""
+    if not includes:
+        return []
+    camera = _camera_of(tables)
+    parts = read_includes(includes, functools.partial(_beside, path), up_axis(camera))
+    found = [camera for part in parts for camera in part.cameras]
+    if "camera" not in tables and found:
+        tables["camera"] = found[0]
+    return parts
+
+
+def _camera_of(tables: dict[str, Any]) -> Camera | None:
+    """The camera of a scene file's tables; None if it has none, or one that will be refused."""
+    try:
+        return TypeAdapter(Camera).validate_python(tables["camera"])
+    except (KeyError, ValidationError):
+        return None
+
+
+def _found(
+    scene: Scene, places: dict[int, np.ndarray], path: Path, included: list[SceneParts], includes: list[Include]
+) -> Scene:
     """The scene with every file found and read, and its objects in their ``places``; a fault names the key."""
     count = len(scene.objects) - len(places) + sum(map(len, places.values()))
     _at(path, "object", lambda: budget.take(OBJECT_BYTES * count, f"a list of {count}"))
@@ -86,11 +113,12 @@ def _found(scene: Scene, places: dict[int, np.ndarray], path: Path) -> Scene:
     environment = _found_environment(scene.environment, path)
     laid_out = dataclasses.replace(scene, objects=tuple(objects), environment=environment)
     try:
+        laid_out = with_includes(laid_out, included, includes)
         laid_out.layout  # noqa: B018  (it refuses sizes that are not allowed)
-    except InputError:
+    except InputError as error:
         for key, entry in zip(_keys(len(scene.objects), places), objects, strict=True):
             _at(path, key, entry.world_from_object)
-        raise
+        raise error.within(str(path)) from None
     return laid_out
 
 

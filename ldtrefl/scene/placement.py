@@ -7,6 +7,10 @@ import numpy as np
 from ldtrefl.base.checked import LARGEST, SMALLEST
 from ldtrefl.base.errors import InputError
 
+Row = tuple[float, float, float, float]
+Matrix = tuple[Row, Row, Row]
+"""Three rows of a matrix whose fourth is 0, 0, 0, 1."""
+
 _IDENTITY = np.eye(4)
 _QUARTERS = np.array([(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)])
 """Cosine and sine of whole quarter turns."""
@@ -18,17 +22,22 @@ def placement(
     scale: float | tuple[float, float, float],
     rotate: tuple[float, float, float, float],
     translate: tuple[float, float, float],
+    matrix: Matrix | None = None,
 ) -> np.ndarray:
-    """``world_from_object``, (4, 4) float64, of one object; :func:`placements` says what is what.
+    """``world_from_object``, (4, 4) float64, of one object; :func:`placements` says what is what, and a ``matrix`` of
+    three rows moves the mesh first.
 
     Raises:
         InputError: its size along an axis is not allowed.
     """
     fitted, scales = np.array([np.nan if fit is None else fit]), np.broadcast_to(scale, (1, 3)).astype(float)
     matrices = placements(bounds[None], fitted, scales, np.array([rotate], float), np.array([translate], float))
+    if matrix is not None:
+        matrices = moved_first(matrices, np.array([matrix]))
     if len(wrong_sizes(matrices, bounds[None])):
         (side,), sizes = _longest_sides(bounds[None]), _sizes(matrices, bounds[None])
         given = "" if fit is None else f"fit {fit:g}, "
+        given += "" if matrix is None else "the matrix, "
         raise InputError(
             f"{given}scale {scale} and the mesh's own size of {side:g} give a size of {sizes.min():g} to "
             f"{sizes.max():g} along its axes, allowed are {SMALLEST:g} to {LARGEST:g}"
@@ -59,6 +68,14 @@ def placements(
         centring = _translations(-(low + (high - low) / 2)[fitted])
         matrices[fitted] @= _scalings(np.repeat(factor[:, None], 3, axis=1)) @ centring
         return matrices
+
+
+def moved_first(matrices: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """(n, 4, 4) placements of meshes that are first moved by (n, 3, 4) rows of matrices."""
+    first = _identities(len(matrices))
+    first[:, :3] = rows
+    with np.errstate(all="ignore"):  # what is not finite is not allowed
+        return np.einsum("nij,njk->nik", matrices, first)
 
 
 def wrong_sizes(matrices: np.ndarray, bounds: np.ndarray) -> np.ndarray:
