@@ -9,6 +9,7 @@ from __future__ import annotations
 import base64
 import binascii
 import json
+import sys
 from collections.abc import Callable
 from typing import Any
 from urllib.parse import unquote, unquote_to_bytes
@@ -26,6 +27,9 @@ TEXT_BYTES = 4.0
 
 VALUE_BYTES = 250.0
 """Bytes that a value of the JSON takes: a name and a number, and what is made of it."""
+
+LARGEST_NUMBER = sys.float_info.max
+"""Numbers of the JSON are kept as float64."""
 
 DEEPEST = 200
 """Lists and tables in one another in the JSON, at most: Python's own limit would be met at some thousand."""
@@ -261,7 +265,7 @@ def _data_of(uri: str, place: str) -> bytes:
 
 
 def _number(value: object, place: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < float("inf"):
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= LARGEST_NUMBER:
         raise InputError(f"{place}: should be a number, got {_short(value)}")
     return float(value)
 

@@ -15,6 +15,14 @@ def test_nodes_share_the_primitives_of_their_mesh() -> None:
     assert second.matrix[0, 3] == 5
 
 
+def test_nodes_without_triangles_are_left_out() -> None:
+    file = Written()
+    file.mesh({"POSITION": file.accessor(QUAD)}, mode=0)
+    places = {"TRANSLATION": file.accessor(np.zeros((2, 3), np.float32))}
+    file.tree["nodes"][0]["extensions"] = {"EXT_mesh_gpu_instancing": {"attributes": places}}
+    assert list(Asset.read(file.as_glb(), nothing_beside).mesh_nodes()) == []
+
+
 def test_weights_of_a_node_are_its_own() -> None:
     file = Written()
     up = file.accessor(np.tile(np.array([0, 0, 1], np.float32), (4, 1)))

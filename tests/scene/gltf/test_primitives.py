@@ -102,6 +102,7 @@ def test_what_has_no_surface_is_left_out_and_named() -> None:
 
 @pytest.mark.parametrize(("change", "match"), [
     ({"mode": 9}, "mode: allowed are 0 to 6"),
+    ({"mode": [4]}, "mode: allowed are 0 to 6"),
     ({"material": 3}, r"there is no materials\[3\]"),
     ({"indices": 9}, r"there is no accessors\[9\]"),
     ({"attributes": {"POSITION": 0, "NORMAL": 1}}, "NORMAL: should have 3 components"),
