@@ -36,6 +36,9 @@ OBJECT_BYTES = 8 << 10
 FAR = 1.0
 """How far before its eye a camera looks, in the file's unit: where, is all the same."""
 
+WIDEST = 64.0
+"""Width over height, or height over width, of an image at most."""
+
 NARROWEST_SHARE = 1e-6
 """Of a node's largest scale: one along another axis below this leaves no body to its mesh."""
 
@@ -153,8 +156,9 @@ class _Builder:
         eye, forward, up = (self.turn[:3, :3] @ vector for vector in (node.position, node.forward, node.up))
         size: dict[str, Any] = {}
         if node.aspect is not None:
-            height = max(1, round(math.sqrt(PIXELS / node.aspect)))
-            size = {"width": max(1, round(height * node.aspect)), "height": height}
+            aspect = min(max(node.aspect, 1.0 / WIDEST), WIDEST)
+            height = round(math.sqrt(PIXELS / aspect))
+            size = {"width": round(height * aspect), "height": height}
         reach = FAR * max(1.0, float(np.abs(eye).max()))
         return Camera(eye=_three(eye), look_at=_three(eye + reach * forward), up=_three(up), fov_y=node.fov_y, **size)
 

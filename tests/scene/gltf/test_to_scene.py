@@ -82,6 +82,14 @@ def test_cameras_keep_their_lens_and_shape(tmp_path: Path) -> None:
     np.testing.assert_allclose(camera.up, [0, 1, 0], atol=1e-12)
 
 
+def test_a_camera_of_no_sensible_shape_gets_one(tmp_path: Path) -> None:
+    for aspect in (1e-300, 1e300):
+        lens = {"yfov": 1.0, "aspectRatio": aspect}
+        file = Written(cameras=[{"type": "perspective", "perspective": lens}], nodes=[{"camera": 0}])
+        (camera,) = scene_parts(file.save(tmp_path)).cameras
+        assert max(camera.width / camera.height, camera.height / camera.width) == pytest.approx(64, rel=0.02)
+
+
 @pytest.mark.parametrize("data", [b"", b"glTF", b"{}", b'{"asset": {"version": "2.0"}, "nodes": [{"mesh": 0}]}'])
 def test_faults_name_the_file(tmp_path: Path, data: bytes) -> None:
     (tmp_path / "a.gltf").write_bytes(data)
