@@ -60,6 +60,8 @@ Whole = Annotated[int, BeforeValidator(plain), Field(strict=True)]
 Flag = Annotated[bool, BeforeValidator(plain), Field(strict=True)]
 Text = Annotated[str, Field(strict=True, min_length=1)]
 Vector = Annotated[tuple[Number, Number, Number], BeforeValidator(plain)]
+_Row = tuple[Number, Number, Number, Number]
+Rows = Annotated[tuple[_Row, _Row, _Row], BeforeValidator(plain)]
 Direction = Annotated[Vector, AfterValidator(_nonzero)]
 
 _Radiance = Annotated[Real, Field(ge=0.0, le=BRIGHTEST)]

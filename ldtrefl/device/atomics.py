@@ -38,3 +38,18 @@ TAKE_PLACE = """
 def take_place(count: wp.array(dtype=wp.int32)) -> wp.int32:
     """``count[0]``, which is then one more, whoever else does the same: Warp's own is not atomic on the CPU."""
     ...
+
+
+ADD_TO = """
+#if defined(__CUDA_ARCH__)
+    atomicAdd((unsigned long long*)(values.data + index), (unsigned long long)value);
+#else
+    __atomic_fetch_add(values.data + index, value, __ATOMIC_RELAXED);
+#endif
+"""
+
+
+@wp.func_native(ADD_TO)
+def add_to(values: wp.array(dtype=wp.int64), index: int, value: wp.int64):
+    """``values[index] += value``, whoever else does the same: Warp's own is not atomic on the CPU."""
+    ...

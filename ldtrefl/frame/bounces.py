@@ -21,6 +21,7 @@ from ldtrefl.device import launch
 from ldtrefl.device.bits import lowest_bit
 from ldtrefl.device.stats import Stats
 from ldtrefl.frame.gbuffer import GBuffer
+from ldtrefl.frame.ray_counts import counts_of
 from ldtrefl.frame.regions import Regions
 from ldtrefl.frame.shadows import direct_radiance_of
 from ldtrefl.frame.skip_options import SkipOptions
@@ -327,11 +328,9 @@ class RayFollower:
         return {entry.index for entry in scene.objects}
 
     def _count(self, rays: RayBuffer, hits: HitBuffer) -> None:
-        stats = self.stats
-        alive = rays.source.numpy() >= 0
-        searches = int(hits.searches.numpy().sum(dtype=np.int64))
-        stats.count("rays", int(np.count_nonzero(alive)))
-        stats.count("steps", int(hits.steps.numpy().sum(dtype=np.int64)))
-        stats.count("searches", searches)
-        others = int(np.count_nonzero(alive)) * (len(self.gbuffer.scene.objects) - 1)
-        stats.count("searches_saved", others + int(np.count_nonzero(rays.may_return.numpy()[alive])) - searches)
+        stats, found = self.stats, counts_of(rays, hits)
+        stats.count("rays", found.alive)
+        stats.count("steps", found.steps)
+        stats.count("searches", found.searches)
+        others = found.alive * (len(self.gbuffer.scene.objects) - 1)
+        stats.count("searches_saved", others + found.returning - found.searches)

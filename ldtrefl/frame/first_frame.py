@@ -11,6 +11,7 @@ from ldtrefl.frame.camera_shading import shade_pixels_kernel, shade_reflectors_k
 from ldtrefl.frame.composite import add_reflection, copy_pixels
 from ldtrefl.frame.large_triangles import draw_large_triangles
 from ldtrefl.frame.projection import project_vertices
+from ldtrefl.frame.ray_counts import count_rays
 from ldtrefl.frame.skip_options import SkipOptions
 from ldtrefl.frame.visibility import resolve_pixels
 from ldtrefl.frame.zbuffer import draw_triangles
@@ -37,4 +38,5 @@ def kernels_of_rays(scene: DeviceScene, tracer: Tracer, skip: SkipOptions) -> li
         shade_hits_kernel(shadow),
         shade_pixels_kernel(shadow),
         shade_reflectors_kernel(shadow, True),
+        count_rays,
     ]

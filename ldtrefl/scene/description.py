@@ -27,6 +27,7 @@ from ldtrefl.base.checked import (
     Positive,
     Real,
     Reflectance,
+    Rows,
     Scale,
     Text,
     Vector,
@@ -190,6 +191,8 @@ class Object:
     params: Mapping[str, object] = Field(default_factory=dict)
     up_axis: UpAxis = "z"
     """The axis of the mesh that is turned to +z."""
+    matrix: Rows | None = None
+    """Three rows of four numbers, by which the mesh is moved first; instead of ``fit``."""
     fit: Positive | None = None
     """Centre the bounding box at 0 and scale its longest side to this, first."""
     scale: Scale = 1.0
@@ -206,6 +209,8 @@ class Object:
             raise ValueError("needs either 'mesh' or 'shape', and not both")
         if self.params and self.shape is None:
             raise ValueError("'params' goes with 'shape'")
+        if self.matrix is not None and self.fit is not None:
+            raise ValueError("'matrix' and 'fit' exclude each other")
         x, y, z, _ = self.rotate
         if abs(x) < SMALLEST and abs(y) < SMALLEST and abs(z) < SMALLEST:
             raise ValueError(f"rotate: the axis must not be the zero vector, nor shorter than {SMALLEST:g}")
@@ -283,7 +288,8 @@ class Object:
 
     @functools.cached_property
     def _world_from_object(self) -> np.ndarray:
-        return placement(self.geometry.fit_bounds, self.fit, self.scale, self.rotate, self.translate, self.up_axis)
+        place = (self.fit, self.scale, self.rotate, self.translate, self.up_axis, self.matrix)
+        return placement(self.geometry.fit_bounds, *place)
 
 
 @refusing_in_one_line

@@ -12,7 +12,7 @@ import numpy as np
 
 from ldtrefl.base.errors import InputError
 from ldtrefl.scene.mesh import Mesh
-from ldtrefl.scene.placement import UpAxis, placements, wrong_sizes
+from ldtrefl.scene.placement import Matrix, UpAxis, moved_first, placements, wrong_sizes
 from ldtrefl.scene.shared_geometries import HasGeometry, SharedGeometries
 
 CORNERS = np.array(np.meshgrid([0, 1], [0, 1], [0, 1])).reshape(3, -1).T
@@ -21,6 +21,9 @@ CORNERS = np.array(np.meshgrid([0, 1], [0, 1], [0, 1])).reshape(3, -1).T
 
 class _Placed(HasGeometry, Protocol):
     """An object of a scene (``description.py``), with what places it."""
+
+    @property
+    def matrix(self) -> Matrix | None: ...
 
     @property
     def fit(self) -> float | None: ...
@@ -70,6 +73,9 @@ class Layout:
         bounds = np.array([mesh.fit_bounds for mesh in numbers]).reshape(-1, 2, 3)[mesh_of]
         up_axes = [entry.up_axis for entry in objects]
         matrices = placements(bounds, fitted, _rows(scales, 3), _rows(turns, 4), _rows(positions, 3), up_axes)
+        own = [number for number, entry in enumerate(objects) if entry.matrix is not None]
+        if own:
+            matrices[own] = moved_first(matrices[own], np.array([objects[number].matrix for number in own], float))
         for number in wrong_sizes(matrices, bounds):
             try:
                 objects[number].world_from_object()

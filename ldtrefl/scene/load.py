@@ -19,11 +19,13 @@ from pydantic import TypeAdapter, ValidationError
 
 from ldtrefl.base import budget
 from ldtrefl.base.errors import InputError, first_fault
-from ldtrefl.scene.description import Environment, Object, Scene
+from ldtrefl.scene.description import Camera, Environment, Object, Scene
 from ldtrefl.scene.framing import check_size
+from ldtrefl.scene.includes import Include, read_includes, split_includes, up_axis, with_includes
 from ldtrefl.scene.mesh import Mesh
 from ldtrefl.scene.mesh_scene import mesh_scene
 from ldtrefl.scene.places import split_places, standing_in
+from ldtrefl.scene.scene_parts import SceneParts
 from ldtrefl.scene.shared_geometries import SharedGeometries
 from ldtrefl.scene.standing import on_the_floor, split_standing
 from ldtrefl.scene.toml_text import read_toml
@@ -105,6 +107,9 @@ def _load_toml(path: Path) -> Scene:
     try:
         tables, standing = split_standing(tables)
         tables, places = split_places(tables)
+        tables, includes = split_includes(tables)
+        with budget.account():
+            included = _included(tables, includes, path)
         scene = _ADAPTER.validate_python(tables)
     except ValidationError as error:
         allowed = _allowed_keys(Scene)
@@ -113,10 +118,37 @@ def _load_toml(path: Path) -> Scene:
     except InputError as error:
         raise error.within(str(path)) from None
     with budget.account():
-        return _found(scene, places, standing, path)
+        return _found(scene, places, standing, path, included, includes)
 
 
-def _found(scene: Scene, places: dict[int, np.ndarray], standing: frozenset[int], path: Path) -> Scene:
+def _included(tables: dict[str, Any], includes: list[Include], path: Path) -> list[SceneParts]:
+    """What the scene file includes. Where it has no camera, ``tables`` is given the first that there is."""
+    if not includes:
+        return []
+    camera = _camera_of(tables)
+    parts = read_includes(includes, functools.partial(_beside, path), up_axis(camera))
+    found = [camera for part in parts for camera in part.cameras]
+    if "camera" not in tables and found:
+        tables["camera"] = found[0]
+    return parts
+
+
+def _camera_of(tables: dict[str, Any]) -> Camera | None:
+    """The camera of a scene file's tables; None if it has none, or one that will be refused."""
+    try:
+        return TypeAdapter(Camera).validate_python(tables["camera"])
+    except (KeyError, ValidationError):
+        return None
+
+
+def _found(
+    scene: Scene,
+    places: dict[int, np.ndarray],
+    standing: frozenset[int],
+    path: Path,
+    included: list[SceneParts],
+    includes: list[Include],
+) -> Scene:
     """The scene with every file found and read, its objects in their ``places`` and ``standing`` where they should; a
     fault names the key."""
     count = len(scene.objects) - len(places) + sum(map(len, places.values()))
@@ -135,15 +167,17 @@ def _found(scene: Scene, places: dict[int, np.ndarray], standing: frozenset[int]
     environment = _found_environment(scene.environment, path)
     laid_out = dataclasses.replace(scene, objects=tuple(objects), environment=environment)
     try:
+        laid_out = with_includes(laid_out, included, includes)
         laid_out.layout  # noqa: B018  (it refuses sizes that are not allowed)
-    except InputError:
+    except InputError as error:
         for key, entry in zip(_keys(len(scene.objects), places), objects, strict=True):
             _at(path, key, entry.world_from_object)
-        raise
+        raise error.within(str(path)) from None
     if not lifted:
         return laid_out
-    objects = _at(path, "object", lambda: on_the_floor(objects, lifted, np.array(scene.camera.up)))
-    return dataclasses.replace(laid_out, objects=tuple(objects))
+    up = np.array(scene.camera.up)
+    moved = _at(path, "object", lambda: on_the_floor(laid_out.objects, lifted, up))
+    return dataclasses.replace(laid_out, objects=tuple(moved))
 
 
 def _keys(tables: int, places: dict[int, np.ndarray]) -> Iterator[str]:

@@ -23,6 +23,10 @@ _UPRIGHT: dict[UpAxis, list[list[float]]] = {
 """The rotations that turn an axis to +z: about x, or for x itself about y. What glTF calls the front, +z with y up,
 comes to -y."""
 
+Row = tuple[float, float, float, float]
+Matrix = tuple[Row, Row, Row]
+"""Three rows of a matrix whose fourth is 0, 0, 0, 1."""
+
 _IDENTITY = np.eye(4)
 _QUARTERS = np.array([(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)])
 """Cosine and sine of whole quarter turns."""
@@ -35,8 +39,10 @@ def placement(
     rotate: tuple[float, float, float, float],
     translate: tuple[float, float, float],
     up_axis: UpAxis = "z",
+    matrix: Matrix | None = None,
 ) -> np.ndarray:
-    """``world_from_object``, (4, 4) float64, of one object; :func:`placements` says what is what.
+    """``world_from_object``, (4, 4) float64, of one object; :func:`placements` says what is what, and a ``matrix`` of
+    three rows moves the mesh first.
 
     Raises:
         InputError: its size along an axis is not allowed.
@@ -44,9 +50,12 @@ def placement(
     fitted, scales = np.array([np.nan if fit is None else fit]), np.broadcast_to(scale, (1, 3)).astype(float)
     turn, offset = np.array([rotate], float), np.array([translate], float)
     matrices = placements(bounds[None], fitted, scales, turn, offset, [up_axis])
+    if matrix is not None:
+        matrices = moved_first(matrices, np.array([matrix]))
     if len(wrong_sizes(matrices, bounds[None])):
         (side,), sizes = _longest_sides(bounds[None]), _sizes(matrices, bounds[None])
         given = "" if fit is None else f"fit {fit:g}, "
+        given += "" if matrix is None else "the matrix, "
         raise InputError(
             f"{given}scale {scale} and the mesh's own size of {side:g} give a size of {sizes.min():g} to "
             f"{sizes.max():g} along its axes, allowed are {SMALLEST:g} to {LARGEST:g}"
@@ -60,7 +69,7 @@ def placements(
     scale: np.ndarray,
     rotate: np.ndarray,
     translate: np.ndarray,
-    up_axes: Sequence[UpAxis],
+    up_axes: Sequence[UpAxis] = (),
 ) -> np.ndarray:
     """``world_from_object`` of n objects, (n, 4, 4) float64; some may not be allowed (:func:`wrong_sizes`).
 
@@ -70,7 +79,7 @@ def placements(
         scale: (n, 3), a factor for each axis.
         rotate: (n, 4), axis and degrees.
         translate: (n, 3), in the world.
-        up_axes: n axes of the meshes that become +z, before the scale.
+        up_axes: n axes of the meshes that become +z, before the scale; z if none are given.
     """
     low, high = bounds[:, 0], bounds[:, 1]
     side = _longest_sides(bounds)
@@ -86,6 +95,14 @@ def placements(
         centring = _translations(-(low + (high - low) / 2)[fitted])
         matrices[fitted] @= _scalings(np.repeat(factor[:, None], 3, axis=1)) @ centring
         return matrices
+
+
+def moved_first(matrices: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """(n, 4, 4) placements of meshes that are first moved by (n, 3, 4) rows of matrices."""
+    first = _identities(len(matrices))
+    first[:, :3] = rows
+    with np.errstate(all="ignore"):  # what is not finite is not allowed
+        return np.einsum("nij,njk->nik", matrices, first)
 
 
 def wrong_sizes(matrices: np.ndarray, bounds: np.ndarray) -> np.ndarray:

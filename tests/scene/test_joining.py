@@ -8,24 +8,20 @@ import trimesh
 from PIL import Image
 
 import ldtrefl
+from ldtrefl.scene.joining import joined_mesh
+from ldtrefl.scene.piece import Piece
 from tests.mesh_writers import write_glb, write_ply
 from tests.part_materials import picture_of
 from tests.scene.readers.soft_box import SCENE
 
 
-def test_pieces_without_normals_get_smooth_ones_each_by_itself(tmp_path: Path) -> None:
+def test_pieces_without_normals_get_smooth_ones_each_by_itself() -> None:
     ball = trimesh.creation.icosphere(2)
-    positions, order = ball.vertices.astype(np.float32), ball.faces.astype(np.uint32).reshape(-1)
-    upper = order.reshape(-1, 3)[positions[order.reshape(-1, 3)][..., 2].mean(axis=1) > 0].reshape(-1)
-    primitives = [
-        {"attributes": {"POSITION": 0, "NORMAL": 1}, "indices": 2},
-        {"attributes": {"POSITION": 0}, "indices": 3},
-    ]
-    tree = {"meshes": [{"primitives": primitives}], "nodes": [{"mesh": 0}], "scenes": SCENE}
-    mesh = ldtrefl.load_mesh(write_glb(tmp_path / "a.glb", [positions, -positions, order, upper], **tree))
-    np.testing.assert_allclose(mesh.normals[: len(positions)], -positions, atol=1e-6)
-    alone = ldtrefl.Mesh(positions, upper.reshape(-1, 3))
-    np.testing.assert_array_equal(mesh.normals[len(positions) :], alone.normals)
+    upper = ball.faces[ball.vertices[ball.faces][..., 2].mean(axis=1) > 0]
+    pieces = [Piece(ball.vertices, ball.faces, -ball.vertices, None), Piece(ball.vertices, upper, None, None)]
+    mesh, count = joined_mesh(pieces), len(ball.vertices)
+    np.testing.assert_allclose(mesh.normals[:count], -ball.vertices, atol=1e-6)
+    np.testing.assert_array_equal(mesh.normals[count:], ldtrefl.Mesh(ball.vertices, upper).normals)
 
 
 def test_no_primitive_of_many_is_lost(tmp_path: Path) -> None:
@@ -39,7 +35,7 @@ def test_no_primitive_of_many_is_lost(tmp_path: Path) -> None:
     assert path.stat().st_size < 1_000_000
     mesh = ldtrefl.load_mesh(path)
     assert len(mesh.faces) == len(mesh.parts) == 20_000
-    assert (mesh.normals == [0, 0, 1]).all()
+    assert mesh.bounds.tolist() == [[0, 0, 0], [1, 1, 0]]
 
 
 def test_a_material_of_many_pieces_has_one_picture(tmp_path: Path) -> None:

@@ -76,6 +76,8 @@ class Asset:
             mesh = self.document.entry("meshes", number, f"{where}.mesh")
             name = node.name or self.document.name(mesh) or f"mesh {number}"
             primitives = self._primitives(number, node, where)
+            if not primitives:
+                continue
             if node.entry.get("skin") is not None and any(one.joints is not None for one in primitives):
                 joints = joint_matrices(self.document, node.entry["skin"], f"{where}.skin", world)
                 yield MeshNode(name, tuple(posed(one, joints, where) for one in primitives), np.eye(4))
@@ -85,7 +87,7 @@ class Asset:
                     if not np.isfinite(matrix).all():
                         raise InputError(f"{where}: the place of instance {k} is not finite")
                     yield MeshNode(f"{name}.{k}", primitives, matrix)
-            elif primitives:
+            else:
                 yield MeshNode(name, primitives, node.matrix)
 
     def _primitives(self, number: int, node: Node, where: str) -> tuple[Primitive, ...]:

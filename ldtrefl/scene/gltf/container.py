@@ -9,6 +9,7 @@ from __future__ import annotations
 import base64
 import binascii
 import json
+import sys
 from collections.abc import Callable
 from typing import Any
 from urllib.parse import unquote, unquote_to_bytes
@@ -21,8 +22,14 @@ MAGIC = b"glTF"
 JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 HEADER, CHUNK_HEADER = 12, 8
 
-JSON_BYTES = 60.0
-"""Bytes that a byte of the JSON takes: its nodes and primitives become objects."""
+TEXT_BYTES = 4.0
+"""Bytes that a byte of the JSON takes: it is decoded, and data in it are decoded once more."""
+
+VALUE_BYTES = 250.0
+"""Bytes that a value of the JSON takes: a name and a number, and what is made of it."""
+
+LARGEST_NUMBER = sys.float_info.max
+"""Numbers of the JSON are kept as float64."""
 
 DEEPEST = 200
 """Lists and tables in one another in the JSON, at most: Python's own limit would be met at some thousand."""
@@ -57,7 +64,8 @@ class Document:
             InputError: it is no glTF 2.0.
         """
         text, self._binary = _chunks(data) if is_glb(data) else (data, None)
-        budget.take(JSON_BYTES * len(text), "its JSON")
+        values = text.count(b",") + text.count(b"{") + text.count(b"[")
+        budget.take(TEXT_BYTES * len(text) + VALUE_BYTES * values, "its JSON")
         self.root = _parsed(text)
         self._beside = beside
         self._buffers: dict[int, bytes] = {}
@@ -257,7 +265,7 @@ def _data_of(uri: str, place: str) -> bytes:
 
 
 def _number(value: object, place: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < float("inf"):
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= LARGEST_NUMBER:
         raise InputError(f"{place}: should be a number, got {_short(value)}")
     return float(value)
 

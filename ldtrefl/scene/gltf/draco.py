@@ -39,7 +39,7 @@ def draco_attributes(document: Document, compressed: Table, attributes: Table, w
     result = {"indices": faces.reshape(-1)}
     for name, number in numbers.items():
         if name in attributes:
-            if number not in found:
+            if not isinstance(number, int) or number not in found:
                 raise InputError(f"{place}.attributes.{name}: there is no attribute {number!r:.40} in its data")
             values = found[number]
             result[name] = values if values.ndim == 2 or "SCALAR" in name else values.reshape(len(values), -1)

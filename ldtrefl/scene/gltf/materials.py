@@ -188,7 +188,7 @@ def unpacked_picture(data: bytes, *, with_alpha: bool) -> StoredPicture:
 
 def _wrap(sampler: Table, key: str, where: str) -> Wrap:
     mode = sampler.get(key, 10497)
-    if mode not in WRAPS:
+    if not isinstance(mode, int) or mode not in WRAPS:
         raise InputError(f"{where}.{key}: allowed are {', '.join(map(str, WRAPS))}, got {mode!r:.40}")
     return WRAPS[mode]
 

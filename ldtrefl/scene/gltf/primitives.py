@@ -62,14 +62,16 @@ def primitives_of(document: Document, number: int, weights: tuple[float, ...] | 
     mesh = document.entries("meshes")[number]
     place = f"meshes[{number}]"
     own = mesh.get("weights", []) if weights is None else list(weights)
+    if not isinstance(own, list):
+        raise InputError(f"{place}.weights: should be a list of numbers")
     found = []
     for index, entry in enumerate(document.entries("primitives", of=mesh, place=place)):
         where = f"{place}.primitives[{index}]"
         mode = entry.get("mode", TRIANGLES)
+        if not isinstance(mode, int) or mode not in (*WITHOUT_SURFACE, TRIANGLES, STRIP, FAN):
+            raise InputError(f"{where}.mode: allowed are 0 to 6, got {mode!r:.40}")
         if mode in WITHOUT_SURFACE:
             continue
-        if mode not in (TRIANGLES, STRIP, FAN):
-            raise InputError(f"{where}.mode: allowed are 0 to 6, got {mode!r:.40}")
         primitive = _primitive(document, entry, where, mode, own)
         if primitive is not None:
             found.append(primitive)
@@ -81,8 +83,9 @@ def modes_without_surface(document: Document) -> set[str]:
     modes: set[str] = set()
     for number, mesh in enumerate(document.entries("meshes")):
         for entry in document.entries("primitives", of=mesh, place=f"meshes[{number}]"):
-            if entry.get("mode") in WITHOUT_SURFACE:
-                modes.add(WITHOUT_SURFACE[entry["mode"]])
+            mode = entry.get("mode")
+            if isinstance(mode, int) and mode in WITHOUT_SURFACE:
+                modes.add(WITHOUT_SURFACE[mode])
     return modes
 
 

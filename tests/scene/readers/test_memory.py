@@ -23,6 +23,9 @@ def test_files_take_what_they_need_from_the_budget(tmp_path: Path, kind: str) ->
     assert len(ldtrefl.load_mesh(path).faces) == 20480
 
 
+CLAIMED = r"a\.glb: .*(needs .* allowed are 4.0 GiB|at most \d+ elements are allowed|ends at byte)"
+
+
 @pytest.mark.parametrize(
     "claim",
     [
@@ -40,5 +43,5 @@ def test_a_glb_that_claims_more_than_it_holds_is_refused(tmp_path: Path, claim: 
     positions, order = ball.vertices.astype(np.float32), ball.faces.astype(np.uint32).reshape(-1)
     meshes = [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}]
     tree = {"meshes": meshes, "nodes": [{"mesh": 0}], "scenes": SCENE, **claim}
-    with pytest.raises(ldtrefl.InputError, match=r"a\.glb: .* needs .* allowed are 4.0 GiB"):
+    with pytest.raises(ldtrefl.InputError, match=CLAIMED):
         ldtrefl.load_mesh(write_glb(tmp_path / "a.glb", [positions, order], **tree))

@@ -1,0 +1,174 @@
+"""A glTF file as parts of a scene: an object for each node that has a mesh, with its materials; lights and cameras.
+
+glTF is y up and metres; its light is in lux and candela, and a white surface sends back 1 / pi of what falls on it.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ldtrefl.base import budget
+from ldtrefl.base.checked import BRIGHTEST
+from ldtrefl.base.errors import InputError, printable
+from ldtrefl.scene.decomposition import placed
+from ldtrefl.scene.description import Camera, Light, Object
+from ldtrefl.scene.gltf.asset import Asset, MeshNode
+from ldtrefl.scene.gltf.container import Beside
+from ldtrefl.scene.gltf.lights import CameraNode, LightNode
+from ldtrefl.scene.gltf.pieces import pieces_of
+from ldtrefl.scene.joining import joined_mesh, joining_bytes
+from ldtrefl.scene.mesh import Mesh
+from ldtrefl.scene.readers.archives import mesh_files
+from ldtrefl.scene.scene_parts import SceneParts
+
+PIXELS = 768 * 512
+"""Of an image whose camera says how wide it is for its height."""
+
+OBJECT_BYTES = 8 << 10
+"""An object of a scene, without its mesh and pictures: what Python and the device keep of it."""
+
+FAR = 1.0
+"""How far before its eye a camera looks, in the file's unit: where, is all the same."""
+
+WIDEST = 64.0
+"""Width over height, or height over width, of an image at most."""
+
+NARROWEST_SHARE = 1e-6
+"""Of a node's largest scale: one along another axis below this leaves no body to its mesh."""
+
+UPRIGHT = {
+    "x": ((0, 1, 0), (-1, 0, 0), (0, 0, 1)),
+    "-x": ((0, -1, 0), (1, 0, 0), (0, 0, 1)),
+    "y": ((1, 0, 0), (0, 1, 0), (0, 0, 1)),
+    "-y": ((1, 0, 0), (0, -1, 0), (0, 0, -1)),
+    "z": ((1, 0, 0), (0, 0, -1), (0, 1, 0)),
+    "-z": ((1, 0, 0), (0, 0, 1), (0, -1, 0)),
+}
+"""Rotations that turn +y to an axis, by its name; the shortest turn."""
+
+_log = logging.getLogger("ldtrefl")
+
+
+def scene_parts(path: Path, *, up: str = "z", lenient: bool = False) -> SceneParts:
+    """What a glTF file holds, turned so that it stands upright. What it holds and is not shown is named in a warning.
+
+    Args:
+        path: the file, ``.gltf`` or ``.glb``, or an archive with one.
+        up: the axis that points up in the scene, one of ``UPRIGHT``.
+        lenient: read what can be read of a file that requires extensions which are not.
+
+    Raises:
+        InputError: it is no glTF 2.0, or not sound; the message names the file.
+    """
+    turn = np.eye(4)
+    turn[:3, :3] = UPRIGHT[up]
+    try:
+        with budget.account(), np.errstate(all="ignore"):
+            data, beside = _only_file(path)
+            asset = Asset.read(data, beside, lenient=lenient)
+            parts, lines = _Builder(asset, turn).parts()
+    except InputError as error:
+        raise error.within(str(path)) from None
+    except Exception as error:  # whatever a damaged file provokes in a reader is the file's fault
+        raise InputError(f"{path}: not a scene that can be read ({type(error).__name__}: {error})") from error
+    for line in [*asset.not_shown(), *lines]:
+        _log.warning("%s: not shown: %s", path, printable(line))
+    return parts
+
+
+def _only_file(path: Path) -> tuple[bytes, Beside]:
+    """The bytes of a glTF file, and what reads files beside it."""
+    found = [(data, beside.get) for data, kind, beside in mesh_files(str(path)) if kind in ("glb", "gltf")]
+    if len(found) != 1:
+        raise InputError(f"one glTF file is needed, got {len(found)}")
+    return found[0]
+
+
+class _Builder:
+    """Turns an asset into parts of a scene."""
+
+    def __init__(self, asset: Asset, turn: np.ndarray) -> None:
+        self.asset, self.turn = asset, turn
+        self.not_shown: list[str] = []
+        self._meshes: dict[int, Mesh] = {}
+        self._kept: list[object] = []
+        """What the keys of ``_meshes`` are the addresses of."""
+        self._used: dict[str, int] = {}
+
+    def parts(self) -> tuple[SceneParts, list[str]]:
+        """The parts, and what of the nodes is not shown."""
+        objects = tuple(self._objects())
+        lights = tuple(self._light(light) for light in self.asset.lights())
+        cameras: list[Camera] = []
+        names: list[str] = []
+        for node in self.asset.cameras():
+            if node.is_perspective:
+                cameras.append(self._camera(node))
+                names.append(node.name or f"camera {len(names)}")
+            else:
+                self.not_shown.append(f"camera '{node.name}' (orthographic)")
+        return SceneParts(objects, lights, tuple(cameras), tuple(names)), self.not_shown
+
+    def _objects(self) -> Iterator[Object]:
+        for node in self.asset.mesh_nodes():
+            matrix = np.einsum("ij,jk->ik", self.turn, node.matrix)
+            if not _has_size(matrix):
+                self.not_shown.append(f"node '{node.name}' (its scale leaves it no size)")
+                continue
+            budget.take(OBJECT_BYTES, "an object")
+            try:
+                yield Object(name=self._name(node.name), mesh=self._mesh(node), **placed(matrix))
+            except InputError as error:
+                raise error.within(f"node '{node.name}'") from None
+
+    def _mesh(self, node: MeshNode) -> Mesh:
+        """The mesh of a node; nodes with the same primitives share one."""
+        key = id(node.primitives)
+        if key not in self._meshes:
+            pieces = pieces_of(node.primitives, self.asset.materials)
+            budget.take(joining_bytes(pieces), f"the mesh of '{node.name}'")
+            self._meshes[key] = joined_mesh(pieces)
+            self._kept.append(node.primitives)
+        return self._meshes[key]
+
+    def _name(self, name: str) -> str:
+        """A name that no object before has."""
+        number = self._used.get(name, 0)
+        self._used[name] = number + 1
+        return name if number == 0 else self._name(f"{name}.{number}")
+
+    def _light(self, light: LightNode) -> Light:
+        red, green, blue = (min(channel / math.pi, BRIGHTEST) for channel in light.color)
+        if light.kind == "directional":
+            direction = self.turn[:3, :3] @ light.direction
+            return Light(kind="directional", direction=_three(direction), radiance=(red, green, blue))
+        if light.kind == "spot":
+            self.not_shown.append(f"the cone of spot light '{light.name}' (it shines to all sides)")
+        return Light(kind="point", position=_three(self.turn[:3, :3] @ light.position), intensity=(red, green, blue))
+
+    def _camera(self, node: CameraNode) -> Camera:
+        eye, forward, up = (self.turn[:3, :3] @ vector for vector in (node.position, node.forward, node.up))
+        size: dict[str, Any] = {}
+        if node.aspect is not None:
+            aspect = min(max(node.aspect, 1.0 / WIDEST), WIDEST)
+            height = round(math.sqrt(PIXELS / aspect))
+            size = {"width": round(height * aspect), "height": height}
+        reach = FAR * max(1.0, float(np.abs(eye).max()))
+        return Camera(eye=_three(eye), look_at=_three(eye + reach * forward), up=_three(up), fov_y=node.fov_y, **size)
+
+
+def _has_size(matrix: np.ndarray) -> bool:
+    """Whether a mesh keeps a body under a matrix."""
+    sizes = np.linalg.svd(matrix[:3, :3], compute_uv=False)
+    return bool(np.isfinite(sizes).all() and sizes[-1] > NARROWEST_SHARE * sizes[0])
+
+
+def _three(vector: np.ndarray) -> tuple[float, float, float]:
+    x, y, z = (float(v) for v in vector)
+    return x, y, z

@@ -1,0 +1,52 @@
+"""What a file gives to a scene: objects, lights and cameras, which may be moved as a whole."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ldtrefl.scene.decomposition import placed
+from ldtrefl.scene.description import Camera, Light, Object
+
+
+@dataclass(frozen=True, eq=False)
+class SceneParts:
+    """What a file gives to a scene."""
+
+    objects: tuple[Object, ...]
+    lights: tuple[Light, ...]
+    cameras: tuple[Camera, ...]
+    names: tuple[str, ...]
+    """Of the cameras."""
+
+    def moved(self, matrix: np.ndarray) -> SceneParts:
+        """The same parts, all moved by a (4, 4) matrix."""
+        objects = tuple(_object_moved(entry, matrix) for entry in self.objects)
+        lights = tuple(_light_moved(light, matrix) for light in self.lights)
+        cameras = tuple(_camera_moved(camera, matrix) for camera in self.cameras)
+        return SceneParts(objects, lights, cameras, self.names)
+
+
+def _object_moved(entry: Object, matrix: np.ndarray) -> Object:
+    place: dict[str, Any] = {"up_axis": "z", "matrix": None, "fit": None}
+    place |= {"scale": 1.0, "rotate": (0.0, 0.0, 1.0, 0.0), "translate": (0.0, 0.0, 0.0)}
+    place |= placed(np.einsum("ij,jk->ik", matrix, entry.world_from_object()))
+    return dataclasses.replace(entry, **place)
+
+
+def _light_moved(light: Light, matrix: np.ndarray) -> Light:
+    if light.direction is not None:
+        return dataclasses.replace(light, direction=tuple(matrix[:3, :3] @ np.asarray(light.direction)))
+    position = matrix @ [*np.asarray(light.position), 1.0]
+    # A scene that is made twice as large is lit the same by a light four times as strong.
+    size = float(np.cbrt(abs(np.linalg.det(matrix[:3, :3]))))
+    intensity = tuple(size * size * channel for channel in np.asarray(light.intensity))
+    return dataclasses.replace(light, position=tuple(position[:3]), intensity=intensity)
+
+
+def _camera_moved(camera: Camera, matrix: np.ndarray) -> Camera:
+    eye, look_at = (tuple((matrix @ [*point, 1.0])[:3]) for point in (camera.eye, camera.look_at))
+    return dataclasses.replace(camera, eye=eye, look_at=look_at, up=tuple(matrix[:3, :3] @ np.asarray(camera.up)))
