@@ -1,10 +1,11 @@
-"""Renders the README's pictures: a scene by layered depth textures with the ray-traced truth inset, mirrors that see
-themselves and one another, and peeled layers.
+"""Renders the README's pictures: a scene by layered depth textures with the ray-traced truth inset, a mesh on every
+stage, mirrors that see themselves and one another, and peeled layers.
 
-    python tools/readme_picture.py             # half a minute; writes teapot.png, mirrors.png and layers.png into docs/
+    python tools/readme_picture.py             # half a minute; writes four pictures into docs/
     python tools/readme_picture.py FOLDER      # the same into another folder
 
-The scenes are those of ``scenes/``, and the layers those of the shape ``genus3``.
+The scenes are those of ``scenes/``, the mesh on the stages is the shape ``teapot``, and the layers those of the shape
+``genus3``.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import numpy as np
 import ldtrefl
 from ldtrefl.compare.layer_picture import draw_layers
 from ldtrefl.scene import shapes
+from ldtrefl.scene.composed import composed
 
 ROOT = Path(__file__).parent.parent
 CROP = (slice(182, 342), slice(288, 528))
@@ -31,6 +33,12 @@ MIRRORS = (
 )
 """Names of the scenes of mirrors in mirrors, as their pictures stand in rows."""
 
+STAGES = ("mirror-ball", "mirror-floor", "chrome")
+"""Stages of which there is a picture."""
+
+STAGE_SIZE = (768, 512)
+"""Width and height of their pictures, before they are halved."""
+
 GAP = 8
 """Width of the white lines between those pictures, pixels."""
 
@@ -44,6 +52,7 @@ def main() -> None:
     parser.add_argument("folder", type=Path, nargs="?", default=ROOT / "docs", help="where the pictures go")
     folder = parser.parse_args().folder
     ldtrefl.save_image(folder / "teapot.png", picture_with_inset())
+    ldtrefl.save_image(folder / "stages.png", picture_of_stages())
     ldtrefl.save_image(folder / "mirrors.png", picture_of_mirrors())
     shape = shapes.make("genus3")
     maps = ldtrefl.peel(shape.vertices, shape.faces, resolution=MAP_RESOLUTION)
@@ -60,6 +69,13 @@ def picture_with_inset() -> np.ndarray:
     framed[FRAME:-FRAME, FRAME:-FRAME] = inset
     picture[: framed.shape[0], -framed.shape[1] :] = framed
     return picture
+
+
+def picture_of_stages() -> np.ndarray:
+    """(h, w, 3) float32: the teapot on all of ``STAGES``, at half their size."""
+    teapot = ldtrefl.Object(name="teapot", shape="teapot", material=ldtrefl.Material(albedo=(0.6, 0.16, 0.1)))
+    pictures = [halved(ldtrefl.render(composed((teapot,), on, size=STAGE_SIZE)).image) for on in STAGES]
+    return _side_by_side(pictures, axis=1)
 
 
 def picture_of_mirrors() -> np.ndarray:

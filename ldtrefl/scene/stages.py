@@ -61,7 +61,7 @@ def mirror_floor(subject: Subject) -> Stage:
 
 def mirror_ball(subject: Subject) -> Stage:
     """Before a mirror ball, to its right and behind it, on a matt floor."""
-    radius = subject.length(0.46 * max(subject.height, 0.7 * subject.width, 0.7 * subject.depth))
+    radius = subject.length(0.46 * max(subject.height, 0.85 * subject.width, 0.85 * subject.depth))
     ball = _ball(subject, "mirror ball", 26.0, radius, 0.04, CHROME, True)
     floor = _floor(subject, Material(albedo=albedo_seen_as(FLOOR)))
     return Stage(_bright_sky(), (floor, ball, *_lamps(subject)), framed=(ball,))

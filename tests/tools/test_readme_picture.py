@@ -6,6 +6,7 @@ import pytest
 import readme_picture
 
 import ldtrefl
+from ldtrefl.scene.stages import STAGES
 
 
 def test_the_inset_is_the_ray_traced_picture() -> None:
@@ -32,3 +33,14 @@ def test_pictures_of_mirrors_stand_in_rows_at_half_their_size(monkeypatch: pytes
     assert (picture[3 : 3 + gap] == 1.0).all() and (picture[:, 2 : 2 + gap] == 1.0).all()
     for name in brightness:
         assert (readme_picture.ROOT / "scenes" / f"{name}.toml").is_file()
+
+
+def test_pictures_of_stages_stand_in_a_row(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each is that of its stage, rendered at twice its size."""
+    monkeypatch.setattr(readme_picture, "STAGE_SIZE", (24, 16))
+    picture, gap = readme_picture.picture_of_stages(), readme_picture.GAP
+    assert picture.shape == (8, 3 * 12 + 2 * gap, 3)
+    assert set(readme_picture.STAGES) < set(STAGES)
+    pictures = [picture[:, left : left + 12] for left in (0, 12 + gap, 24 + 2 * gap)]
+    assert (picture[:, 12 : 12 + gap] == 1.0).all() and all((one < 1.0).all() for one in pictures)
+    assert len({one.tobytes() for one in pictures}) == 3
