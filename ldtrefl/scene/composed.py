@@ -7,10 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ldtrefl.base.errors import unknown_name
 from ldtrefl.scene.description import Camera, Light, Lighting, Object, Scene
 from ldtrefl.scene.framing import three_quarter_camera
-from ldtrefl.scene.stages import CHROME, STAGES, bare
+from ldtrefl.scene.stages import CHROME, bare, find_stage, makes_a_mirror
 from ldtrefl.scene.studio import studio_lighting, studio_lights
 from ldtrefl.scene.subject import Subject
 
@@ -43,11 +42,10 @@ def composed(
     Raises:
         InputError: an unknown stage, or no objects.
     """
-    if on is not None and on not in STAGES:
-        raise unknown_name("stage", on, STAGES)
+    make_stage = bare if on is None else find_stage(on)
     subject = Subject.of(objects)
-    stage = (bare if on is None else STAGES[on])(subject)
-    if mirror_self or stage.is_chrome:
+    stage = make_stage(subject)
+    if mirror_self or makes_a_mirror(on):
         objects = tuple(dataclasses.replace(entry, material=CHROME) for entry in objects)
     if on is not None or camera is None:
         points = [subject.points]

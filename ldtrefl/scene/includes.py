@@ -86,7 +86,7 @@ def read_includes(includes: list[Include], find: Callable[[str, str], str], up: 
         key = f"include[{number}]"
         path = find(include.file, f"{key}.file")
         try:
-            found.append(_moved(scene_parts(Path(path), up=up), include))
+            found.append(moved_as_told(scene_parts(Path(path), up=up), include))
         except InputError as error:
             raise error.within(key) from None
     return found
@@ -115,8 +115,12 @@ def up_axis(camera: Camera | None) -> str:
     return ("" if up[axis] > 0 else "-") + "xyz"[axis]
 
 
-def _moved(parts: SceneParts, include: Include) -> SceneParts:
-    """Parts of a scene moved as the table says."""
+def moved_as_told(parts: SceneParts, include: Include) -> SceneParts:
+    """Parts of a scene moved as the table says.
+
+    Raises:
+        InputError: the axis of the rotation is no direction.
+    """
     if not any(include.rotate[:3]):
         raise InputError("rotate: the axis must not be the zero vector")
     scale = np.broadcast_to(include.scale, (1, 3)).astype(float)

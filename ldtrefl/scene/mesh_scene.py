@@ -1,4 +1,8 @@
-"""A mesh file as a scene: its objects, upright, on a stage of ``stages.py`` or by themselves."""
+"""A mesh file as a scene: its objects, upright, on a stage of ``stages.py`` or by themselves.
+
+Of a glTF file each node that has a mesh is an object; alone they are seen by the file's first camera and lit by its
+lights, where it has any. Any other file is one object.
+"""
 
 from __future__ import annotations
 
@@ -6,15 +10,30 @@ import typing
 from contextlib import suppress
 from pathlib import Path
 
-from ldtrefl.base.errors import unknown_name
+from ldtrefl.base.errors import InputError, unknown_name
 from ldtrefl.files.regular_files import check_regular
 from ldtrefl.scene.composed import composed
 from ldtrefl.scene.description import Object, Scene
+from ldtrefl.scene.includes import Include, moved_as_told
 from ldtrefl.scene.placement import UpAxis
+from ldtrefl.scene.scene_parts import SceneParts
+from ldtrefl.scene.stages import makes_a_mirror
 
-Y_UP = (".glb", ".gltf", ".obj")
+GLTF = (".glb", ".gltf")
+
+Y_UP = (*GLTF, ".obj")
 """Files with y up: glTF by its specification, OBJ as most programs write it and as Blender reads it. Of the others
 Blender takes z for up, as 3MF and what is printed from STL do."""
+
+FROM_Y_UP: dict[UpAxis, tuple[float, float, float, float]] = {
+    "x": (0.0, 0.0, 1.0, 90.0),
+    "y": (0.0, 0.0, 1.0, 0.0),
+    "z": (1.0, 0.0, 0.0, -90.0),
+    "-x": (0.0, 0.0, 1.0, -90.0),
+    "-y": (1.0, 0.0, 0.0, 180.0),
+    "-z": (1.0, 0.0, 0.0, 90.0),
+}
+"""Axis and degrees of the rotation of a file that was turned to have its y up, but has another axis up."""
 
 
 def mesh_scene(
@@ -32,21 +51,51 @@ def mesh_scene(
     """
     with suppress(OSError):  # a missing file: its reader says so
         check_regular(path, "a mesh file")
-    if up is not None and up not in typing.get_args(UpAxis):
+    is_mirror = mirror_self or makes_a_mirror(on)
+    parts = parts_of_file(path, up_axis_of(path, up), as_one=is_mirror)
+    camera = parts.cameras[0] if parts.cameras else None
+    return composed(parts.objects, on, lights=parts.lights, camera=camera, mirror_self=mirror_self, size=size)
+
+
+def up_axis_of(path: Path, up: str | None) -> UpAxis:
+    """The axis of a file that points up: ``up``, or else that of most files of its kind, by the ending of its name.
+
+    Raises:
+        InputError: ``up`` is no axis.
+    """
+    if up is None:
+        return "y" if path.suffix.lower() in Y_UP else "z"
+    if up not in typing.get_args(UpAxis):
         raise unknown_name("axis", up, typing.get_args(UpAxis))
-    return composed(objects_of_file(path, typing.cast(UpAxis | None, up)), on, mirror_self=mirror_self, size=size)
+    return typing.cast(UpAxis, up)
 
 
-def objects_of_file(path: Path, up: UpAxis | None) -> tuple[Object, ...]:
+def parts_of_file(path: Path, up: UpAxis, *, as_one: bool = False) -> SceneParts:
     """What a mesh file holds, upright: z up, its front to -y.
 
     Args:
         path: the file.
-        up: its axis that points up; that of its kind if not given.
+        up: its axis that points up.
+        as_one: make one object of all that it holds. Then it has one material for all.
+
+    Raises:
+        InputError: the file cannot be read.
     """
-    return (Object(name=path.stem, mesh=str(path), up_axis=up or usual_up_axis(path)),)
+    try:
+        whole = Object(name=path.stem, mesh=str(path), up_axis=up)
+    except InputError as error:
+        raise InputError(f"{path}: a mesh file's name must be text in UTF-8") from error
+    include = include_of(path, up)
+    if include is None:
+        return SceneParts((whole,), (), (), ())
+    from ldtrefl.scene.gltf.to_scene import scene_parts  # noqa: PLC0415  its readers take a quarter of a second
+
+    parts = moved_as_told(scene_parts(path), include)
+    return SceneParts((whole,), parts.lights, parts.cameras, parts.names) if as_one else parts
 
 
-def usual_up_axis(path: Path) -> UpAxis:
-    """The axis that points up in most files of this kind, by the ending of its name."""
-    return "y" if path.suffix.lower() in Y_UP else "z"
+def include_of(path: Path, up: UpAxis) -> Include | None:
+    """What a scene file says to have the objects of a file; None if it is no glTF file, and one object."""
+    if path.suffix.lower() not in GLTF:
+        return None
+    return Include(file=str(path), rotate=FROM_Y_UP[up], lights=False)

@@ -11,9 +11,10 @@ from typing import Any
 from ldtrefl.base.errors import InputError
 from ldtrefl.files.atomic_write import replaceable, written_whole
 from ldtrefl.scene.description import Material, Reflection, Scene
+from ldtrefl.scene.includes import Include
 from ldtrefl.scene.mesh import Mesh
 
-FILES = ("mesh", "texture", "image")
+FILES = ("mesh", "texture", "image", "file")
 """Keys that name files."""
 
 COMMENTS = {
@@ -23,6 +24,8 @@ COMMENTS = {
     "lighting.ambient": "from all sides, as if it were the radiance of a white surface",
     "light.direction": "the way the light travels",
     "light.radiance": "leaving a white surface that faces it",
+    "include": "all nodes of a glTF file",
+    "include.lights": "whether its lights come, too",
     "object.mesh": "looked for beside this file, then in LDTREFL_MESH_PATH",
     "object.up_axis": "the axis of the mesh that is turned to z",
     "object.shape": "docs/scenes.md lists them",
@@ -38,15 +41,20 @@ BARE = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789
 """Characters of keys without quotation marks."""
 
 
-def save_scene(path: str | Path, scene: Scene) -> None:
+def save_scene(path: str | Path, scene: Scene, include: Include | None = None) -> None:
     """Write a scene file. The paths of files in it are relative to its folder.
+
+    Args:
+        path: of the scene file.
+        scene: what it says.
+        include: what brings those objects whose meshes are in memory.
 
     Raises:
         InputError: it cannot be written, or an object's mesh is in no file.
     """
     path = check_scene_writable(path)
     try:
-        data = scene_text(scene, path).encode("utf-8")
+        data = scene_text(scene, path, include).encode("utf-8")
     except UnicodeEncodeError as error:
         raise InputError(f"{path}: a name in it is no text ({error.reason})") from None
     with written_whole(path) as scratch:
@@ -68,8 +76,8 @@ def check_scene_writable(path: str | Path) -> Path:
     return path
 
 
-def scene_text(scene: Scene, path: Path) -> str:
-    """The scene as a file at ``path``: what has its default is left out.
+def scene_text(scene: Scene, path: Path, include: Include | None = None) -> str:
+    """The scene as a file at ``path``: what has its default is left out; :func:`save_scene` says what is what.
 
     Raises:
         InputError: an object's mesh is in no file.
@@ -80,8 +88,12 @@ def scene_text(scene: Scene, path: Path) -> str:
     lines.table("lighting", "[lighting]", _written(scene.lighting, always=True))
     for light in scene.lights:
         lines.table("light", "[[light]]", _written(light))
+    if include is not None and any(isinstance(entry.mesh, Mesh) for entry in scene.objects):
+        lines.table("include", "[[include]]", _written(include))
     for entry in scene.objects:
         if isinstance(entry.mesh, Mesh):
+            if include is not None:
+                continue
             raise InputError(f"{path}: the mesh of the object '{entry.called}' is in no file that a scene could name")
         lines.table("object", "[[object]]", _written(entry))
         if material := list(_material(entry.material)):

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ldtrefl.base.errors import unknown_name
 from ldtrefl.scene.description import Environment, Material, Object
 from ldtrefl.scene.studio import albedo_seen_as, backdrop
 from ldtrefl.scene.subject import Subject
@@ -36,8 +37,6 @@ class Stage:
     """(n, 3): what else belongs into it."""
     elevation: float = 20.0
     """Degrees that the camera looks down. With 20 the horizon is above the picture."""
-    is_chrome: bool = False
-    """Whether the subject itself is a mirror."""
 
 
 def bare(_: Subject) -> Stage:
@@ -80,7 +79,7 @@ def chrome(subject: Subject) -> Stage:
         )
     )
     floor = _floor(subject, Material(albedo=albedo_seen_as(FLOOR)))
-    return Stage(_bright_sky(), (floor, *balls, *_lamps(subject)), framed=balls, is_chrome=True)
+    return Stage(_bright_sky(), (floor, *balls, *_lamps(subject)), framed=balls)
 
 
 STAGES: dict[str, Callable[[Subject], Stage]] = {
@@ -90,6 +89,26 @@ STAGES: dict[str, Callable[[Subject], Stage]] = {
     "chrome": chrome,
 }
 """What the user calls them."""
+
+
+def find_stage(name: str) -> Callable[[Subject], Stage]:
+    """The stage of this name.
+
+    Raises:
+        InputError: there is none.
+    """
+    if name not in STAGES:
+        raise unknown_name("stage", name, STAGES)
+    return STAGES[name]
+
+
+def makes_a_mirror(name: str | None) -> bool:
+    """Whether a subject is a mirror itself on the stage of this name.
+
+    Raises:
+        InputError: there is none.
+    """
+    return name is not None and find_stage(name) is chrome
 
 
 def _bright_sky() -> Environment:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import ldtrefl
-from ldtrefl.scene.mesh_scene import mesh_scene, objects_of_file, usual_up_axis
+from ldtrefl.scene.mesh_scene import mesh_scene, parts_of_file, up_axis_of
 
 OBJ = "v 0 0 0\nv 1 0 0\nv 0 2 0\nv 0 0 3\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 """A tetrahedron that is 1 long in x, 2 in y and 3 in z."""
@@ -24,7 +24,7 @@ def file(tmp_path: Path) -> Path:
     [("a.glb", "y"), ("A.GLTF", "y"), ("a.obj", "y"), ("a.ply", "z"), ("a.stl", "z"), ("a.off", "z"), ("a.3mf", "z")],
 )
 def test_what_points_up_depends_on_the_kind_of_file(name: str, axis: str) -> None:
-    assert usual_up_axis(Path(name)) == axis
+    assert up_axis_of(Path(name), None) == axis and up_axis_of(Path(name), "-x") == "-x"
 
 
 @pytest.mark.parametrize(("up", "height"), [(None, 2.0), ("x", 1.0), ("-y", 2.0), ("z", 3.0)])
@@ -34,7 +34,7 @@ def test_it_stands_upright(file: Path, up: str | None, height: float) -> None:
 
 
 def test_the_object_has_the_name_of_the_file(file: Path) -> None:
-    (entry,) = objects_of_file(file, "z")
+    (entry,) = parts_of_file(file, "z").objects
     assert (entry.name, entry.mesh, entry.up_axis) == ("corner", str(file), "z")
 
 

@@ -35,7 +35,7 @@ from ldtrefl.frame.first_frame import foresee_a_frame
 from ldtrefl.methods import find_method
 from ldtrefl.renderer import Renderer
 from ldtrefl.scene.load import is_scene_file
-from ldtrefl.scene.mesh_scene import usual_up_axis
+from ldtrefl.scene.mesh_scene import include_of, up_axis_of
 from ldtrefl.scene.scene_text import check_scene_writable, save_scene
 
 PLACE_IN_HELP = 10
@@ -82,7 +82,7 @@ def render(
     with _maps_kept(cache, no_cache), budget.account():
         loaded = scene_of(scene, on, up, mirror, size)
         if scene_file is not None:
-            save_scene(scene_file, loaded)
+            save_scene(scene_file, loaded, include_of(scene, up_axis_of(scene, up)))
         options = parsed_settings(settings)
         # Before they are passed on by name: one may be called as a parameter of Renderer is.
         find_method(loaded.reflection.method if method is None else method).configured(options)
@@ -92,7 +92,7 @@ def render(
     total = sum(frame.stats.seconds.values())
     say(f"{path}: {frame.image.shape[1]} x {frame.image.shape[0]} in {total:.2f} s", stage_times(frame))
     if up is None and not is_scene_file(scene):
-        say(f"its {usual_up_axis(scene)} axis points up; --up names another")
+        say(f"its {up_axis_of(scene, up)} axis points up; --up names another")
     if stats:
         for line in _in_words(frame.stats.counters):
             say(line)
