@@ -61,6 +61,7 @@ class Element:
 
     @property
     def lists(self) -> list[Property]:
+        """Those of its properties that are lists."""
         return [entry for entry in self.properties if entry.length]
 
 

@@ -57,6 +57,7 @@ class Lines:
         return self.array[np.minimum(self.starts + place, self.ends)]
 
     def line(self, k: int) -> bytes:
+        """A line by its place in the block, without its newline."""
         return self.text[self.starts[k] : self.ends[k]]
 
     def rows(self, chosen: np.ndarray, skipped: int, *, least: int) -> tuple[np.ndarray, np.ndarray]:

@@ -17,6 +17,7 @@ import numpy as np
 from ldtrefl.base import budget
 from ldtrefl.base.errors import InputError
 from ldtrefl.files.srgb import linear_from_srgb
+from ldtrefl.scene.joining import joining_bytes
 from ldtrefl.scene.piece import Piece, moved
 from ldtrefl.scene.readers.corner_tables import split_corners
 from ldtrefl.scene.readers.pictures import Pictures
@@ -30,7 +31,7 @@ BYTES_PER_BYTE = 40.0
 """Bytes that a byte of unpacked XML takes; measured."""
 
 MOST_PLACED = 100_000
-"""Meshes that are placed: a few objects made of each other can stand for any number."""
+"""Objects that are placed: a few that are made of each other can stand for any number."""
 
 DEEPEST = 32
 """Objects made of objects made of objects."""
@@ -73,6 +74,8 @@ class _Package:
     scales: dict[str, float] = field(default_factory=dict)
     items: list[tuple[Key, np.ndarray]] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    visits: int = 0
+    """Objects that were placed."""
 
     def read(self, name: str, pictures: Pictures, *, is_root: bool) -> None:
         """Read a model of the archive."""
@@ -123,12 +126,15 @@ class _Package:
 
     def placed(self, key: Key, matrix: np.ndarray, depth: int = 0) -> Iterator[tuple[Key, np.ndarray]]:
         """The meshes that an object stands for, and where."""
+        self.visits += 1
+        if self.visits > MOST_PLACED:
+            raise InputError(f"more than {MOST_PLACED} objects are placed")
         if depth > DEEPEST:
             raise InputError(f"objects are made of each other more than {DEEPEST} deep")
         if key in self.meshes:
             yield key, matrix
         for other, place in self.components.get(key, []):
-            yield from self.placed(other, np.einsum("ij,jk->ik", matrix, place), depth + 1)
+            yield from self.placed(other, np.einsum("ij,jk->ik", matrix, self.scaled(place, key[0])), depth + 1)
 
     def pieces(self, key: Key) -> list[Piece]:
         """A mesh as pieces, one for each picture, in millimetres."""
@@ -168,6 +174,12 @@ class _Package:
             return Piece(taken, faces, None, values_of, look)
         return Piece(taken, faces, None, None, look, colors=values_of)
 
+    def scaled(self, place: np.ndarray, name: str) -> np.ndarray:
+        """A place that a model gives in its unit, in millimetres."""
+        result = place.copy()
+        result[:3, 3] *= self.scales[name]
+        return result
+
     def note(self, line: str) -> None:
         if line not in self.notes:
             self.notes.append(line)
@@ -182,25 +194,17 @@ def pieces_of_3mf(data: bytes) -> tuple[list[Piece], list[str]]:
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         package = _Package(archive)
         pictures = Pictures(package.file)
-        package.read(_root(archive), pictures, is_root=True)
+        root = _root(archive)
+        package.read(root, pictures, is_root=True)
         made: dict[Key, list[Piece]] = {}
         pieces: list[Piece] = []
-        for number, (key, matrix) in enumerate(
-            place for item, start in package.items for place in package.placed(item, _scaled(start, package, item))
-        ):
-            if number >= MOST_PLACED:
-                raise InputError(f"more than {MOST_PLACED} meshes are placed")
-            if key not in made:
-                made[key] = package.pieces(key)
-            pieces += [moved(piece, matrix) for piece in made[key]]
+        for item, start in package.items:
+            for key, matrix in package.placed(item, package.scaled(start, root)):
+                if key not in made:
+                    made[key] = package.pieces(key)
+                budget.take(joining_bytes(made[key]), f"object {key[1]}")
+                pieces += [moved(piece, matrix) for piece in made[key]]
     return pieces, package.notes + pictures.not_shown
-
-
-def _scaled(matrix: np.ndarray, package: _Package, key: Key) -> np.ndarray:
-    """A place whose way is in millimetres."""
-    result = matrix.copy()
-    result[:3, 3] *= package.scales[key[0]]
-    return result
 
 
 def _root(archive: zipfile.ZipFile) -> str:

@@ -188,9 +188,7 @@ def test_corners_keep_apart_what_only_texture_coordinates_part(tmp_path: Path) -
     text = "v 0 0 0\nv 0 1 0\nv 1 0 1\nv -1 0 1\nvt 0 0\nvt 1 0\nvt 0.5 1\n"
     mesh = loaded(tmp_path, text + "f 1/1 3/3 2/1\nf 1/2 2/2 4/3\n")
     assert mesh.uvs is not None
-    np.testing.assert_array_equal(
-        mesh.uvs[mesh.faces], [[[0, 0], [0.5, 1], [0, 0]], [[1, 0], [1, 0], [0.5, 1]]]
-    )
+    np.testing.assert_array_equal(mesh.uvs[mesh.faces], [[[0, 0], [0.5, 1], [0, 0]], [[1, 0], [1, 0], [0.5, 1]]])
     edge = mesh.normals[mesh.faces][:, [0, 2, 1]]
     np.testing.assert_allclose(edge[0, 0], edge[1, 0], atol=1e-6)
 
@@ -262,7 +260,13 @@ def test_blocks_of_lines_are_one_file(tmp_path: Path, monkeypatch: pytest.Monkey
     lines = []
     for k in range(40):
         lines += [f"v {x:.4f} {y:.4f} {z:.4f}" for x, y, z in rng.uniform(size=(3, 3))]
-        lines += ["vt 0 1", f"usemtl m{k % 3}", "f -3/-1 \\", f" -2/{k + 1} -1/-1", f"v 0 0 {k} 1 0 0" if k == 20 else ""]
+        lines += [
+            "vt 0 1",
+            f"usemtl m{k % 3}",
+            "f -3/-1 \\",
+            f" -2/{k + 1} -1/-1",
+            f"v 0 0 {k} 1 0 0" if k == 20 else "",
+        ]
     text = "\n".join(lines)
     whole = loaded(tmp_path, text)
     for size in (1, 7, 100):
