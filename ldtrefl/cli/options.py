@@ -42,6 +42,9 @@ Up = Annotated[
 Mirror = Annotated[
     str | None, typer.Option("--mirror", metavar="self", help="'self' makes a mesh a mirror, on any stage.")
 ]
+Lenient = Annotated[
+    bool, typer.Option("--lenient", help="Show what can be read of a glTF file that requires unknown extensions.")
+]
 Size = Annotated[
     str | None, typer.Option("--size", metavar="WxH", help="Pixels of the picture; the scene's own if not given.")
 ]
@@ -81,7 +84,12 @@ def allow_memory(size: str | None) -> None:
 
 
 def scene_of(
-    file: Path, on: str | None = None, up: str | None = None, mirror: str | None = None, size: str | None = None
+    file: Path,
+    on: str | None = None,
+    up: str | None = None,
+    mirror: str | None = None,
+    size: str | None = None,
+    lenient: bool = False,
 ) -> Scene:
     """The scene of a scene file or a mesh file, by the options above.
 
@@ -90,7 +98,8 @@ def scene_of(
     """
     if mirror not in (None, "self"):
         raise InputError(f"--mirror {mirror}: only 'self' is allowed")
-    return load_scene(file, on=on, up=up, mirror_self=mirror is not None, size=parsed_size(size))
+    mirror_self = mirror is not None
+    return load_scene(file, on=on, up=up, mirror_self=mirror_self, size=parsed_size(size), lenient=lenient)
 
 
 def parsed_size(size: str | None) -> tuple[int, int] | None:

@@ -23,19 +23,20 @@ from ldtrefl.device.stats import Stats
 from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.ray_counts import counts_of
 from ldtrefl.frame.regions import Regions
-from ldtrefl.frame.shadows import direct_radiance_of
+from ldtrefl.frame.shadows import shaded_by
 from ldtrefl.frame.skip_options import SkipOptions
 from ldtrefl.frame.taken_rays import taken
 from ldtrefl.geometry.vectors import point_along
 from ldtrefl.shading.environment import environment_radiance
 from ldtrefl.shading.specular import mirror_direction
 from ldtrefl.shading.surface import Surface, extended_coordinates, may_return
-from ldtrefl.shading.surfaces import GROUP, Sighting, color_surface, look_along
+from ldtrefl.shading.surfaces import GROUP, Sighting, look_along
 from ldtrefl.tracing.closest_hits import closest_hits_kernel
 from ldtrefl.tracing.nothing import no_shadows
 from ldtrefl.tracing.object_sets import ObjectSets
 from ldtrefl.tracing.ray_buffers import HitBuffer, RayBuffer, RayEnds, empty_hits, empty_rays
 from ldtrefl.tracing.tracer import BoundTracer, Tracer, block_of
+from ldtrefl.world.look_records import Looks
 from ldtrefl.world.records import LightingRecord, ObjectRecord
 from ldtrefl.world.top_level import TopLevel
 
@@ -119,9 +120,9 @@ def add_brought(radiance: wp.array(dtype=wp.vec3), numbers: wp.array(dtype=wp.in
 
 
 @launch.once
-def shade_hits_kernel(tracer: Tracer) -> wp.Kernel:
+def shade_hits_kernel(tracer: Tracer, has_looks: bool) -> wp.Kernel:
     """The kernel that adds what rays met to what they bring, and sends them on from mirrors."""
-    direct_radiance = direct_radiance_of(tracer)
+    shaded = shaded_by(tracer, has_looks)
 
     @launch.kernel
     def shade_hits(
@@ -133,6 +134,7 @@ def shade_hits_kernel(tracer: Tracer) -> wp.Kernel:
         objects: wp.array(dtype=ObjectRecord),
         top: TopLevel,
         lighting: LightingRecord,
+        looks: Looks,
         views: wp.array(dtype=tracer.view),
         numbers: wp.array(dtype=wp.int32),  # of the rays among the first bounce's; empty: they are those
         least_weight: float,
@@ -162,9 +164,8 @@ def shade_hits_kernel(tracer: Tracer) -> wp.Kernel:
                 lane = lowest_bit(wp.uint64(lanes))
                 lanes = lanes & (lanes - 1)
                 i = begin + lane
-                color_surface(objects, sightings, lane, surfaces)
                 surfaces[lane].position = placed_on_ray(objects, rays, hits, i, surfaces[lane].position)
-                light = direct_radiance(views, objects, top, lighting, surfaces[lane])
+                light = shaded(views, objects, top, lighting, looks, sightings, lane, surfaces)
                 if wp.max(surfaces[lane].mirror) > 0.0:
                     light += go_on(objects, lighting, rays, i, surfaces[lane], least_weight, onwards_out)
                 add_brought(radiance, numbers, i, wp.cw_mul(rays.throughput[i], light))
@@ -316,8 +317,9 @@ class RayFollower:
             places = wp.array(np.empty(0, np.int32) if numbers is None else numbers, dtype=wp.int32, device=device)
             weight = np.inf if is_last else self.limits.least_weight
             block = block_of(device)
-            inputs = [block, rays, hits, scene.records, scene.top_level, scene.lighting, shadow.views, places, weight]
-            launch.launch(shade_hits_kernel(shadow.tracer), -(-count // block), [*inputs, radiance, onwards], device)
+            inputs = [block, rays, hits, scene.records, scene.top_level, scene.lighting, scene.looks, shadow.views]
+            kernel = shade_hits_kernel(shadow.tracer, scene.has_looks)
+            launch.launch(kernel, -(-count // block), [*inputs, places, weight, radiance, onwards], device)
         return hits, onwards
 
     def _needed(self, regions: Regions) -> set[int]:

@@ -8,13 +8,14 @@ from ldtrefl.device import launch
 from ldtrefl.device.bits import lowest_bit
 from ldtrefl.frame.backdrop import fill_backdrop
 from ldtrefl.frame.gbuffer import GBuffer, GBufferView, sight
-from ldtrefl.frame.shadows import direct_radiance_of
+from ldtrefl.frame.shadows import shaded_by
 from ldtrefl.shading.specular import mirror_direction
 from ldtrefl.shading.surface import Surface, may_return
-from ldtrefl.shading.surfaces import GROUP, Sighting, color_surface, look_from
+from ldtrefl.shading.surfaces import GROUP, Sighting, look_from
 from ldtrefl.tracing.nothing import no_shadows
 from ldtrefl.tracing.ray_buffers import RayBuffer, empty_rays
 from ldtrefl.tracing.tracer import BoundTracer, Tracer, block_of
+from ldtrefl.world.look_records import Looks
 from ldtrefl.world.records import LightingRecord, ObjectRecord
 from ldtrefl.world.top_level import TopLevel
 
@@ -23,9 +24,9 @@ PIXELS_IN_A_ROW = 256
 
 
 @launch.once
-def shade_pixels_kernel(tracer: Tracer) -> wp.Kernel:
+def shade_pixels_kernel(tracer: Tracer, has_looks: bool) -> wp.Kernel:
     """The kernel that shades what the camera sees, reflectors left out."""
-    direct_radiance = direct_radiance_of(tracer)
+    shaded = shaded_by(tracer, has_looks)
 
     @launch.kernel
     def shade_pixels(
@@ -36,6 +37,7 @@ def shade_pixels_kernel(tracer: Tracer) -> wp.Kernel:
         objects: wp.array(dtype=ObjectRecord),
         top: TopLevel,
         lighting: LightingRecord,
+        looks: Looks,
         views: wp.array(dtype=tracer.view),
         # Out:
         radiance_out: wp.array(dtype=wp.vec3),
@@ -62,8 +64,8 @@ def shade_pixels_kernel(tracer: Tracer) -> wp.Kernel:
             while lanes != 0:
                 lane = lowest_bit(wp.uint64(lanes))
                 lanes = lanes & (lanes - 1)
-                color_surface(objects, sightings, lane, surfaces)
-                radiance_out[begin + lane] = direct_radiance(views, objects, top, lighting, surfaces[lane])
+                light = shaded(views, objects, top, lighting, looks, sightings, lane, surfaces)
+                radiance_out[begin + lane] = light
 
     return shade_pixels
 
@@ -80,10 +82,10 @@ def start_ray(rays: RayBuffer, i: int, objects: wp.array(dtype=ObjectRecord), su
 
 
 @launch.once
-def shade_reflectors_kernel(tracer: Tracer, starts_rays: bool) -> wp.Kernel:
+def shade_reflectors_kernel(tracer: Tracer, starts_rays: bool, has_looks: bool) -> wp.Kernel:
     """The kernel that shades the pixels that see a reflector, without what it reflects, and starts their rays if
     ``starts_rays``."""
-    direct_radiance, with_rays = direct_radiance_of(tracer), wp.constant(starts_rays)
+    shaded, with_rays = shaded_by(tracer, has_looks), wp.constant(starts_rays)
 
     @launch.kernel
     def shade_reflectors(
@@ -95,6 +97,7 @@ def shade_reflectors_kernel(tracer: Tracer, starts_rays: bool) -> wp.Kernel:
         objects: wp.array(dtype=ObjectRecord),
         top: TopLevel,
         lighting: LightingRecord,
+        looks: Looks,
         views: wp.array(dtype=tracer.view),
         # Out:
         rays: RayBuffer,
@@ -113,9 +116,8 @@ def shade_reflectors_kernel(tracer: Tracer, starts_rays: bool) -> wp.Kernel:
                 sight(gbuffer, pixels[begin + lane], sightings, lane)
             look_from(objects, (1 << count) - 1, gbuffer.camera.eye, sightings, surfaces)
             for lane in range(count):
-                color_surface(objects, sightings, lane, surfaces)
                 pixel = pixels[begin + lane]
-                radiance_out[pixel] = direct_radiance(views, objects, top, lighting, surfaces[lane])
+                radiance_out[pixel] = shaded(views, objects, top, lighting, looks, sightings, lane, surfaces)
                 mirror_out[begin + lane] = surfaces[lane].mirror
                 if with_rays:
                     rays.pixel[begin + lane] = pixel
@@ -145,8 +147,9 @@ def shade_gbuffer(
     if radiance is None or radiance.shape[0] != gbuffer.pixel_count:
         radiance = wp.empty(gbuffer.pixel_count, dtype=wp.vec3, device=device)
     block = PIXELS_IN_A_ROW if device.is_cpu else 1
-    inputs = [block, gbuffer.view, scene.records, scene.top_level, scene.lighting, shadow.views, radiance]
-    launch.launch(shade_pixels_kernel(shadow.tracer), -(-gbuffer.pixel_count // block), inputs, device)
+    inputs = [block, gbuffer.view, scene.records, scene.top_level, scene.lighting, scene.looks, shadow.views, radiance]
+    kernel = shade_pixels_kernel(shadow.tracer, scene.has_looks)
+    launch.launch(kernel, -(-gbuffer.pixel_count // block), inputs, device)
     return _with_reflectors(gbuffer, shadow, radiance, starts_rays=starts_rays)
 
 
@@ -162,7 +165,7 @@ def _with_reflectors(gbuffer: GBuffer, shadow: BoundTracer, radiance: wp.array, 
     scene, device, pixels = gbuffer.scene, gbuffer.scene.device, gbuffer.reflector_pixels
     count = pixels.shape[0]
     mirror, rays = wp.empty(count, dtype=wp.vec3, device=device), empty_rays(count if starts_rays else 0, device)
-    block, kernel = block_of(device), shade_reflectors_kernel(shadow.tracer, starts_rays)
-    inputs = [block, pixels, gbuffer.view, scene.records, scene.top_level, scene.lighting, shadow.views]
+    block, kernel = block_of(device), shade_reflectors_kernel(shadow.tracer, starts_rays, scene.has_looks)
+    inputs = [block, pixels, gbuffer.view, scene.records, scene.top_level, scene.lighting, scene.looks, shadow.views]
     launch.launch(kernel, -(-count // block), [*inputs, rays, radiance, mirror], device)
     return Shaded(radiance, mirror, rays)

@@ -9,7 +9,7 @@ from ldtrefl.device import launch
 from ldtrefl.frame.shadow_terminator import rise_to_smooth
 from ldtrefl.geometry.sphere import sphere_entry
 from ldtrefl.geometry.vectors import as_double
-from ldtrefl.shading.direct_light import make_direct_radiance
+from ldtrefl.shading.direct_light import make_shaded
 from ldtrefl.shading.surface import Surface
 from ldtrefl.tracing.nothing import NOTHING
 from ldtrefl.tracing.tracer import Query, Tracer
@@ -48,8 +48,8 @@ def shadow_ray(record: ObjectRecord, surface: Surface, towards: wp.vec3, distanc
 
 
 @launch.once
-def direct_radiance_of(tracer: Tracer) -> Callable[..., wp.vec3]:
-    """``direct_radiance`` with this tracer's shadows."""
+def shaded_by(tracer: Tracer, has_looks: bool) -> Callable[..., wp.vec3]:
+    """``shaded`` with this tracer's shadows."""
     is_occluded = tracer.occluded
 
     @wp.func
@@ -106,4 +106,4 @@ def direct_radiance_of(tracer: Tracer) -> Callable[..., wp.vec3]:
     ) -> bool:
         return True
 
-    return make_direct_radiance(always_lit if tracer is NOTHING else is_lit)
+    return make_shaded(always_lit if tracer is NOTHING else is_lit, has_looks)

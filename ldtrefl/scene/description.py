@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import BeforeValidator, Field, ValidatorFunctionWrapHandler, WrapValidator, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 from pydantic.dataclasses import dataclass
 
 from ldtrefl.base.checked import (
@@ -26,7 +26,6 @@ from ldtrefl.base.checked import (
     Number,
     Positive,
     Real,
-    Reflectance,
     Rows,
     Scale,
     Text,
@@ -41,6 +40,7 @@ from ldtrefl.files.picture_reading import stored_picture
 from ldtrefl.files.stored_picture import StoredPicture
 from ldtrefl.scene import shapes
 from ldtrefl.scene.layout import Layout
+from ldtrefl.scene.material import Material
 from ldtrefl.scene.mesh import Mesh
 from ldtrefl.scene.placement import UpAxis, placement
 from ldtrefl.scene.readers import load_mesh
@@ -55,8 +55,6 @@ PARALLEL = 1e-9
 """Sine of the angle between the line of sight and ``up``: below it float64's rounding decides where right is."""
 NARROWEST = 1e-6
 """The smallest field of view in degrees: at 16,384 pixels a pixel's share is still far above float64's rounding."""
-ROUNDING = 1e-6
-"""How far above 1 albedo and mirror may add up without a warning: decimals such as 0.9 and 0.1 are rounded."""
 
 
 @refusing_in_one_line
@@ -134,49 +132,6 @@ class Light:
                     fault = "needs" if kind == self.kind else "has no"
                     raise ValueError(f"a {self.kind} light {fault} '{key}' (it has {' and '.join(own[self.kind])})")
         return self
-
-
-class _NotGiven(tuple[float, float, float]):
-    """The albedo of a material for which none was given. ``dataclasses.replace`` hands it on to the copy, whose albedo
-    then was not given either, and follows the copy's ``mirror``."""
-
-
-def _check_if_given(value: object, check: ValidatorFunctionWrapHandler) -> object:
-    return value if isinstance(value, _NotGiven) else check(value)
-
-
-@refusing_in_one_line
-@dataclass(frozen=True, kw_only=True, config=CONFIG)
-class Material:
-    """``emission + albedo * texture * light + mirror * reflected radiance``."""
-
-    albedo: Annotated[Color, WrapValidator(_check_if_given)] = _NotGiven((0.8, 0.8, 0.8))
-    """0.8 if it is not given; 0 where ``mirror`` is, because a mirror that also scatters light gives back too much."""
-    texture: Text | None = None
-    """A picture, times albedo; needs UVs. Without one, the mesh file's own textures count."""
-    emission: Color = (0.0, 0.0, 0.0)
-    mirror: Reflectance = (0.0, 0.0, 0.0)
-    """Specular reflectance; any channel above 0 makes the object a reflector."""
-    fresnel: Flag = False
-    """Schlick's approximation, with ``mirror`` as the reflectance at normal incidence."""
-
-    def __post_init__(self) -> None:
-        if isinstance(self.albedo, _NotGiven):
-            object.__setattr__(self, "albedo", _NotGiven((0.0 if any(self.mirror) else 0.8,) * 3))
-
-    @functools.cached_property
-    def picture(self) -> StoredPicture | None:
-        """The picture that ``texture`` names, read when it is first asked for; None without one."""
-        return None if self.texture is None else stored_picture(self.texture)
-
-    @property
-    def excess(self) -> tuple[float, str] | None:
-        """The largest sum of albedo and mirror in a channel, and the channel, where it is above 1; else None."""
-        (a, b, c), (d, e, f) = self.albedo, self.mirror
-        largest = max(a + d, b + e, c + f)
-        if largest <= 1.0 + ROUNDING:
-            return None
-        return largest, ("red", "green", "blue")[(a + d, b + e, c + f).index(largest)]
 
 
 @refusing_in_one_line

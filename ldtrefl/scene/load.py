@@ -64,6 +64,7 @@ def load_scene(
     up: str | None = None,
     mirror_self: bool = False,
     size: tuple[int, int] | None = None,
+    lenient: bool = False,
 ) -> Scene:
     """Read a scene file (TOML) with its meshes and its pictures, or make a scene of a mesh file.
 
@@ -78,6 +79,7 @@ def load_scene(
             z of others.
         mirror_self: of a mesh file: make it a mirror.
         size: width and height of the picture in pixels, in place of the scene's own.
+        lenient: of a glTF file: show what can be read of one that requires extensions which are not.
 
     Raises:
         InputError: one line naming the file, the key, what is wrong and what is allowed.
@@ -86,8 +88,8 @@ def load_scene(
     check_size(size)
     if not is_scene_file(path):
         with budget.account():
-            return mesh_scene(path, on, up, mirror_self=mirror_self, size=size)
-    for name, value in (("on", on), ("up", up), ("mirror_self", mirror_self or None)):
+            return mesh_scene(path, on, up, mirror_self=mirror_self, size=size, lenient=lenient)
+    for name, value in (("on", on), ("up", up), ("mirror_self", mirror_self or None), ("lenient", lenient or None)):
         if value is not None:
             raise InputError(f"{path}: '{name}' goes with a mesh file, this is a scene file")
     scene = _load_toml(path)

@@ -26,10 +26,10 @@ Y_UP = (*GLTF, ".obj")
 Blender takes z for up, as 3MF and what is printed from STL do."""
 
 FROM_Y_UP: dict[UpAxis, tuple[float, float, float, float]] = {
-    "x": (0.0, 0.0, 1.0, 90.0),
+    "x": (0.0, 1.0, 0.0, -90.0),
     "y": (0.0, 0.0, 1.0, 0.0),
     "z": (1.0, 0.0, 0.0, -90.0),
-    "-x": (0.0, 0.0, 1.0, -90.0),
+    "-x": (0.0, 1.0, 0.0, 90.0),
     "-y": (1.0, 0.0, 0.0, 180.0),
     "-z": (1.0, 0.0, 0.0, 90.0),
 }
@@ -43,6 +43,7 @@ def mesh_scene(
     *,
     mirror_self: bool = False,
     size: tuple[int, int] | None = None,
+    lenient: bool = False,
 ) -> Scene:
     """The scene of a mesh file; :func:`ldtrefl.load_scene` says what is what.
 
@@ -51,8 +52,8 @@ def mesh_scene(
     """
     with suppress(OSError):  # a missing file: its reader says so
         check_regular(path, "a mesh file")
-    is_mirror = mirror_self or makes_a_mirror(on)
-    parts = parts_of_file(path, up_axis_of(path, up), as_one=is_mirror)
+    as_one = (mirror_self or makes_a_mirror(on)) and not lenient
+    parts = parts_of_file(path, up_axis_of(path, up), as_one=as_one, lenient=lenient)
     camera = parts.cameras[0] if parts.cameras else None
     return composed(parts.objects, on, lights=parts.lights, camera=camera, mirror_self=mirror_self, size=size)
 
@@ -70,13 +71,14 @@ def up_axis_of(path: Path, up: str | None) -> UpAxis:
     return typing.cast(UpAxis, up)
 
 
-def parts_of_file(path: Path, up: UpAxis, *, as_one: bool = False) -> SceneParts:
+def parts_of_file(path: Path, up: UpAxis, *, as_one: bool = False, lenient: bool = False) -> SceneParts:
     """What a mesh file holds, upright: z up, its front to -y.
 
     Args:
         path: the file.
         up: its axis that points up.
-        as_one: make one object of all that it holds. Then it has one material for all.
+        as_one: make one object of all that it holds, which a scene file can give one material.
+        lenient: read what can be read of a glTF file that requires extensions which are not.
 
     Raises:
         InputError: the file cannot be read.
@@ -90,7 +92,7 @@ def parts_of_file(path: Path, up: UpAxis, *, as_one: bool = False) -> SceneParts
         return SceneParts((whole,), (), (), ())
     from ldtrefl.scene.gltf.to_scene import scene_parts  # noqa: PLC0415  its readers take a quarter of a second
 
-    parts = moved_as_told(scene_parts(path), include)
+    parts = moved_as_told(scene_parts(path, lenient=lenient), include)
     return SceneParts((whole,), parts.lights, parts.cameras, parts.names) if as_one else parts
 
 

@@ -13,15 +13,15 @@ from ldtrefl.base.errors import InputError
 UpAxis = Literal["x", "y", "z", "-x", "-y", "-z"]
 
 _UPRIGHT: dict[UpAxis, list[list[float]]] = {
-    "x": [[0, 0, -1], [0, 1, 0], [1, 0, 0]],
+    "x": [[0, -1, 0], [0, 0, -1], [1, 0, 0]],
     "y": [[1, 0, 0], [0, 0, -1], [0, 1, 0]],
     "z": [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
-    "-x": [[0, 0, 1], [0, 1, 0], [-1, 0, 0]],
+    "-x": [[0, 1, 0], [0, 0, -1], [-1, 0, 0]],
     "-y": [[1, 0, 0], [0, 0, 1], [0, -1, 0]],
     "-z": [[1, 0, 0], [0, -1, 0], [0, 0, -1]],
 }
-"""The rotations that turn an axis to +z: about x, or for x itself about y. What glTF calls the front, +z with y up,
-comes to -y."""
+"""The rotations that turn an axis to +z: about x; of x itself, about z to y first. What glTF calls the front, +z with
+y up, comes to -y."""
 
 Row = tuple[float, float, float, float]
 Matrix = tuple[Row, Row, Row]

@@ -92,7 +92,7 @@ def scene_text(scene: Scene, path: Path, include: Include | None = None) -> str:
         lines.table("include", "[[include]]", _written(include))
     for entry in scene.objects:
         if isinstance(entry.mesh, Mesh):
-            if include is not None:
+            if include is not None and entry.material == Material():
                 continue
             raise InputError(f"{path}: the mesh of the object '{entry.called}' is in no file that a scene could name")
         lines.table("object", "[[object]]", _written(entry))

@@ -1,7 +1,7 @@
-"""Direct light: the radiance that a surface emits, and scatters diffusely of what lights send.
+"""Direct light: the radiance that a surface emits, and scatters of what lights send.
 
 Outgoing radiance of a surface: ``emission + albedo * texture * (ambient + sum of lights) + mirror * reflected``. The
-last term is added elsewhere (``frame/composite.py``).
+last term is added elsewhere (``frame/composite.py``). Surfaces with a look may get less ambient light (``finish.py``).
 """
 
 from __future__ import annotations
@@ -12,7 +12,10 @@ from typing import Any
 import warp as wp
 
 from ldtrefl.geometry.vectors import from_to
+from ldtrefl.shading.finish import Finish, finish_surface
 from ldtrefl.shading.surface import Surface
+from ldtrefl.shading.surfaces import Sighting, color_surface
+from ldtrefl.world.look_records import Looks
 from ldtrefl.world.records import LightingRecord, ObjectRecord
 from ldtrefl.world.top_level import TopLevel
 
@@ -29,12 +32,15 @@ def at_most_largest(radiance: wp.vec3) -> wp.vec3:
     return wp.min(radiance, wp.vec3(LARGEST_RADIANCE))
 
 
-def make_direct_radiance(is_lit: Callable[..., bool]) -> Callable[..., wp.vec3]:
-    """``direct_radiance(views, objects, top, lighting, surface)``: emitted and diffusely scattered radiance.
+def make_direct_radiance(is_lit: Callable[..., bool], has_looks: bool) -> Callable[..., wp.vec3]:
+    """``direct_radiance(views, objects, top, lighting, surface, finish)``: emitted and scattered radiance; ``finish``
+    counts only if ``has_looks``.
 
     ``is_lit(views, objects, top, surface, direction, distance)`` answers whether light arrives from unit ``direction``,
     from a light at ``distance``; it closes over a tracer, so shadows exist once for all tracers.
     """
+
+    with_looks = wp.constant(has_looks)
 
     @wp.func
     def direct_radiance(
@@ -43,8 +49,11 @@ def make_direct_radiance(is_lit: Callable[..., bool]) -> Callable[..., wp.vec3]:
         top: TopLevel,
         lighting: LightingRecord,
         surface: Surface,
+        finish: Finish,
     ) -> wp.vec3:
         total = lighting.ambient
+        if with_looks:
+            total = finish.ambient * lighting.ambient
         for i in range(lighting.lights.shape[0]):
             towards = lighting.lights[i].towards
             radiance = lighting.lights[i].radiance
@@ -61,3 +70,47 @@ def make_direct_radiance(is_lit: Callable[..., bool]) -> Callable[..., wp.vec3]:
         return at_most_largest(surface.emission + wp.cw_mul(surface.albedo, total))
 
     return direct_radiance
+
+
+def make_shaded(is_lit: Callable[..., bool], has_looks: bool) -> Callable[..., wp.vec3]:
+    """``shaded(views, objects, top, lighting, looks, sightings, lane, surfaces)``: what ``direct_radiance`` gives for
+    a lane's surface, of which what its object's colours, or its look, say is set first.
+
+    ``has_looks`` says whether any object of the scene has a look.
+    """
+    direct_radiance = make_direct_radiance(is_lit, has_looks)
+
+    @wp.func
+    def shaded_without_looks(
+        views: Any,
+        objects: wp.array(dtype=ObjectRecord),
+        top: TopLevel,
+        lighting: LightingRecord,
+        looks: Looks,
+        sightings: wp.array(dtype=Sighting),
+        lane: int,
+        surfaces: wp.array(dtype=Surface),
+    ) -> wp.vec3:
+        color_surface(objects, sightings, lane, surfaces)
+        return direct_radiance(views, objects, top, lighting, surfaces[lane], Finish())
+
+    @wp.func
+    def shaded_with_looks(
+        views: Any,
+        objects: wp.array(dtype=ObjectRecord),
+        top: TopLevel,
+        lighting: LightingRecord,
+        looks: Looks,
+        sightings: wp.array(dtype=Sighting),
+        lane: int,
+        surfaces: wp.array(dtype=Surface),
+    ) -> wp.vec3:
+        finish = Finish()
+        finish.ambient = 1.0
+        if objects[sightings[lane].object].look >= 0:
+            finish = finish_surface(objects, looks, sightings, lane, surfaces)
+        else:
+            color_surface(objects, sightings, lane, surfaces)
+        return direct_radiance(views, objects, top, lighting, surfaces[lane], finish)
+
+    return shaded_with_looks if has_looks else shaded_without_looks

@@ -10,6 +10,7 @@ import warp as wp
 from ldtrefl.base.errors import InputError
 from ldtrefl.files.stored_picture import StoredPicture
 from ldtrefl.scene.mesh import Mesh, Part
+from ldtrefl.world.texture_pool import joined_texels
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,15 +29,18 @@ class Appearance:
         return bool(self.texels.shape[0] + self.texel_bytes.shape[0] > 0)
 
 
-def appearance_of(mesh: Mesh, texture: StoredPicture | None, device: wp.Device) -> Appearance:
+def appearance_of(
+    mesh: Mesh, texture: StoredPicture | None, device: wp.Device, *, has_look: bool = False
+) -> Appearance:
     """Upload the colours and textures of a mesh's parts; a texture of several parts is uploaded once.
 
-    ``texture`` takes the place of all parts' own textures if it is given.
+    ``texture`` takes the place of all parts' own textures if it is given. With ``has_look`` there are no textures: an
+    object's look has them.
 
     Raises:
         InputError: there is a texture, and the mesh has no texture coordinates; or the textures have too many texels.
     """
-    textures = [_base_picture(part) if texture is None else texture for part in mesh.parts]
+    textures = [None if has_look else _base_picture(part) if texture is None else texture for part in mesh.parts]
     pools: dict[type, list[np.ndarray]] = {np.float32: [], np.uint8: []}
     places: dict[str, tuple[int, int, int, int]] = {}
     for picture in textures:
@@ -53,8 +57,8 @@ def appearance_of(mesh: Mesh, texture: StoredPicture | None, device: wp.Device) 
         wp.array([p.first_triangle for p in mesh.parts], dtype=wp.int32, device=device),
         wp.array([p.material.base_color for p in mesh.parts], dtype=wp.vec3, device=device),
         wp.array(table, dtype=wp.vec4i, device=device),
-        _joined(pools[np.float32], wp.vec3, device),
-        _joined(pools[np.uint8], wp.vec3ub, device),
+        joined_texels(pools[np.float32], wp.vec3, device),
+        joined_texels(pools[np.uint8], wp.vec3ub, device),
     )
 
 
@@ -62,22 +66,3 @@ def _base_picture(part: Part) -> StoredPicture | None:
     """The picture of a part's base colour; None without one."""
     texture = part.material.base_texture
     return None if texture is None else texture.picture
-
-
-def _joined(pools: list[np.ndarray], dtype: type, device: wp.Device) -> wp.array:
-    """(n, 3) arrays, one after the other, on a device. On the CPU a single one is not copied: it may be large.
-
-    Raises:
-        InputError: they are more than can be numbered.
-    """
-    total = sum(len(pool) for pool in pools)
-    if total > np.iinfo(np.int32).max:
-        raise InputError(f"an object's textures have {total} texels, at most {np.iinfo(np.int32).max} allowed")
-    if len(pools) == 1:
-        return wp.array(pools[0], dtype=dtype, device=device, copy=False)
-    joined = wp.empty(total, dtype=dtype, device=device)
-    first = 0
-    for pool in pools:
-        wp.copy(joined, wp.array(pool, dtype=dtype, device=device, copy=False), dest_offset=first)
-        first += len(pool)
-    return joined

@@ -9,9 +9,12 @@ import warp as wp
 
 from ldtrefl.device import warp_abi
 from ldtrefl.files.stored_picture import StoredPicture
+from ldtrefl.scene.material import Material
 from ldtrefl.scene.mesh import Mesh
 from ldtrefl.world.appearance import Appearance, appearance_of
 from ldtrefl.world.clusters import Clusters, clustered
+from ldtrefl.world.look_records import LookRecord
+from ldtrefl.world.looks import has_material, look_of, mesh_needs_look
 from ldtrefl.world.outliers import Outliers, outliers_of
 
 
@@ -27,6 +30,8 @@ class DeviceMesh:
         """Bytes of the normals and texture coordinates that have been uploaded."""
         self._appearances: dict[str | None, Appearance] = {}
         """By key of the texture."""
+        self._looks: dict[object, LookRecord] = {}
+        """By what the scene says of an object."""
 
     @functools.cached_property
     def reach(self) -> float:
@@ -72,6 +77,37 @@ class DeviceMesh:
         uploaded = wp.array(values, dtype=dtype, device=self.vertices.device, copy=False)
         self.attribute_bytes += warp_abi.array_bytes(uploaded)
         return uploaded
+
+    @functools.cached_property
+    def has_material(self) -> bool:
+        """Whether the mesh's file says anything of its colours."""
+        return has_material(self.mesh)
+
+    @functools.cached_property
+    def needs_look(self) -> bool:
+        """Whether the mesh's file says more of its surface than colours and plain pictures."""
+        return mesh_needs_look(self.mesh)
+
+    def look(self, material: Material) -> LookRecord:
+        """The look of an object with this mesh. Objects of which the scene says the same share one."""
+        if material.key not in self._looks:
+            self._looks[material.key] = look_of(self.mesh, material, self._look_arrays, self.vertices.device)
+        return self._looks[material.key]
+
+    @functools.cached_property
+    def _look_arrays(self) -> dict[str, wp.array]:
+        """What a look has of the vertices, by the names of its fields; empty arrays of what the mesh has not."""
+        arrays = {"uvs": self.uvs}
+        for name, width, dtype in (("second_uvs", 2, wp.vec2), ("colors", 4, wp.vec4), ("tangents", 4, wp.vec4)):
+            values = getattr(self.mesh, name)
+            missing = np.zeros((0, width), np.float32)
+            arrays[name] = self._attribute(missing if values is None else values, dtype)
+        return arrays
+
+    @functools.cached_property
+    def bare_appearance(self) -> Appearance:
+        """The colours of the mesh's parts without textures, of objects that have a look."""
+        return appearance_of(self.mesh, None, self.vertices.device, has_look=True)
 
     @functools.cached_property
     def no_normals(self) -> wp.array:

@@ -25,8 +25,10 @@ from ldtrefl.world.device_mesh import DeviceMesh
 from ldtrefl.world.device_object import DeviceObject, DeviceObjects
 from ldtrefl.world.device_space import device_space
 from ldtrefl.world.lighting import lighting_of
+from ldtrefl.world.look_records import Looks
 from ldtrefl.world.object_records import fill_places, fill_records
 from ldtrefl.world.records import LightingRecord, ObjectRecord
+from ldtrefl.world.scene_looks import SceneLooks
 from ldtrefl.world.top_level import TopLevel, order_of, top_level
 from ldtrefl.world.triangle_numbers import MOST_NUMBERS, TriangleNumbers, numbered
 
@@ -55,6 +57,7 @@ class DeviceScene:
         self._top_order: np.ndarray | None = None if before is None else before._top_order
         decoded = wp.array(linear_of_bytes(), dtype=float, device=device, copy=False)
         self._decoded: wp.array = decoded if before is None else before._decoded  # records that are taken over read it
+        self._looks: SceneLooks = SceneLooks(self._decoded, device) if before is None else before._looks
         self.device_from_world = device_space(scene.layout_box)
         if before is not None and before.scene.layout.has_meshes_of(scene.layout):
             self._take_over(before)
@@ -65,6 +68,7 @@ class DeviceScene:
         self.lighting: LightingRecord = lighting_of(
             scene, self.device_from_world, self._decoded, device, lighting_before
         )
+        self.looks: Looks = self._looks.struct
         self.look_from(scene.camera)
 
     def _place_all(self, before: DeviceScene | None) -> None:
@@ -125,7 +129,7 @@ class DeviceScene:
     def _fill(self, numbers: np.ndarray) -> None:
         """Fill in all but the places of the objects of these numbers."""
         records, sources = self._rows(numbers), [self.scene.objects[number] for number in numbers]
-        known = [self.meshes, self.mesh_of[numbers], self._decoded]
+        known = [self.meshes, self.mesh_of[numbers], self._decoded, self._looks]
         fill_records(records, sources, *known, skip_attributes=self._skip_attributes)
         self._put_back(records, numbers)
 
@@ -164,6 +168,11 @@ class DeviceScene:
     def device_units_per_world_unit(self) -> float:
         """How long a world unit is in device space."""
         return float(self.device_from_world[0, 0])
+
+    @functools.cached_property
+    def has_looks(self) -> bool:
+        """Whether any object has a look: else kernels are built that know of none."""
+        return bool((self._records["look"] >= 0).any())
 
     @functools.cached_property
     def is_reflector(self) -> np.ndarray:

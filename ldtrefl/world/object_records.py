@@ -15,9 +15,11 @@ import warp as wp
 
 from ldtrefl.device.struct_arrays import copy_structs
 from ldtrefl.files.stored_picture import StoredPicture
-from ldtrefl.scene.description import Material, Object
+from ldtrefl.scene.description import Object
+from ldtrefl.scene.material import Material, is_given
 from ldtrefl.world.device_mesh import DeviceMesh
 from ldtrefl.world.records import ObjectRecord
+from ldtrefl.world.scene_looks import SceneLooks
 
 MOST_DOUBLINGS = 120
 """Largest exponent, up or down, of the power of two ``unit_per_device``: float32 reaches from 2^-126 to 2^127."""
@@ -29,6 +31,7 @@ def fill_records(
     meshes: Sequence[DeviceMesh],
     mesh_of: np.ndarray,
     decoded: wp.array,
+    looks: SceneLooks,
     *,
     skip_attributes: bool,
 ) -> None:
@@ -40,23 +43,28 @@ def fill_records(
         meshes: some meshes.
         mesh_of: (n,) the number of each object's mesh.
         decoded: (256,) float32, the linear value of every byte.
+        looks: of the scene, to which those of the objects are added.
         skip_attributes: leave out normals and texture coordinates that shading does not read.
     """
     materials = [source.material for source in sources]
     albedo, mirror, emission = (_colors(materials, name) for name in ("albedo", "mirror", "emission"))
+    look_of = looks.numbers_of(materials, meshes, mesh_of)
+    albedo[_is_colored_by_file(materials, meshes, mesh_of)] = 1.0
     # An object that only glows needs no normals.
-    is_lit = np.maximum(albedo, mirror).max(axis=1, initial=0.0) > 0.0
+    is_lit = (np.maximum(albedo, mirror).max(axis=1, initial=0.0) > 0.0) | (look_of >= 0)
     smooth = np.array([source.smooth for source in sources], bool) & is_lit
     needs_normals = smooth if skip_attributes else np.ones_like(smooth)
     pictures, picture_of = _pictures(materials)
     # Objects of one kind share all that is not their own.
-    kinds, kind_of = np.unique((mesh_of * len(pictures) + picture_of) * 2 + needs_normals, return_inverse=True)
+    shares = (mesh_of * len(pictures) + picture_of) * 4 + 2 * (look_of >= 0) + needs_normals
+    kinds, kind_of = np.unique(shares, return_inverse=True)
     shared = []
     for kind in kinds.tolist():
-        mesh, picture = divmod(kind // 2, len(pictures))
-        uses = {"needs_normals": bool(kind % 2), "skip_attributes": skip_attributes}
+        mesh, picture = divmod(kind // 4, len(pictures))
+        uses = {"needs_normals": bool(kind & 1), "has_look": bool(kind & 2), "skip_attributes": skip_attributes}
         shared.append(_shared_record(meshes[mesh], pictures[picture], decoded, **uses))
     copy_structs(wp.array(shared, dtype=ObjectRecord, device="cpu").numpy(), kind_of, records)
+    records["look"] = look_of
     records["smooth"], records["fresnel"] = smooth, [material.fresnel for material in materials]
     records["albedo"], records["mirror"], records["emission"] = albedo, mirror, emission
     records["returns"] = _sides_with_returns(meshes, mesh_of, mirror.max(axis=1, initial=0.0) > 0.0)
@@ -86,6 +94,15 @@ def _colors(materials: Sequence[Material], name: str) -> np.ndarray:
     return np.fromiter(chain.from_iterable(map(attrgetter(name), materials)), float, 3 * len(materials)).reshape(-1, 3)
 
 
+def _is_colored_by_file(materials: Sequence[Material], meshes: Sequence[DeviceMesh], mesh_of: np.ndarray) -> np.ndarray:
+    """(n,) whether the mesh's file alone says an object's colour: no albedo is given, nor a mirror, beside which it is
+    0."""
+    is_colored = np.array([mesh.has_material for mesh in meshes], bool)[mesh_of]
+    for index in np.flatnonzero(is_colored).tolist():
+        is_colored[index] = not is_given(materials[index].albedo) and not any(materials[index].mirror)
+    return is_colored
+
+
 def _sides_with_returns(meshes: Sequence[DeviceMesh], mesh_of: np.ndarray, is_reflector: np.ndarray) -> np.ndarray:
     """(n,) from which sides rays can come back to each object; 0 where none leave it, because it does not mirror."""
     of_mesh = np.zeros(len(meshes), np.int64)
@@ -110,10 +127,16 @@ def _pictures(materials: Sequence[Material]) -> tuple[list[StoredPicture | None]
 
 
 def _shared_record(
-    mesh: DeviceMesh, texture: StoredPicture | None, decoded: wp.array, *, needs_normals: bool, skip_attributes: bool
+    mesh: DeviceMesh,
+    texture: StoredPicture | None,
+    decoded: wp.array,
+    *,
+    needs_normals: bool,
+    has_look: bool,
+    skip_attributes: bool,
 ) -> ObjectRecord:
     """A record of a mesh's arrays and colours, and of the vertex attributes that shading reads."""
-    record, look = ObjectRecord(), mesh.appearance(texture)
+    record, look = ObjectRecord(), mesh.bare_appearance if has_look else mesh.appearance(texture)
     record.vertices, record.faces, record.exact_vertices = mesh.vertices, mesh.faces, mesh.exact_vertices
     record.normals = mesh.normals if needs_normals else mesh.no_normals
     record.uvs = mesh.uvs if look.has_textures or not skip_attributes else mesh.no_uvs

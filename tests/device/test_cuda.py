@@ -1,5 +1,6 @@
 """Every kernel compiles for CUDA; no GPU is needed for that. None has constants that a compiler must warn of."""
 
+import itertools
 import re
 from pathlib import Path
 
@@ -28,11 +29,11 @@ def all_kernels() -> list[wp.Kernel]:
         batch_kernel(tracer, 1, True)
         closest_hits_kernel(tracer, 1)
         search_pixels_kernel(tracer, 1)
-    for tracer in (NOTHING, BVH, *TRACERS.values()):
-        shade_hits_kernel(tracer)
-        shade_pixels_kernel(tracer)
-        shade_reflectors_kernel(tracer, True)
-        shade_reflectors_kernel(tracer, False)
+    for tracer, has_looks in itertools.product((NOTHING, BVH, *TRACERS.values()), (False, True)):
+        shade_hits_kernel(tracer, has_looks)
+        shade_pixels_kernel(tracer, has_looks)
+        shade_reflectors_kernel(tracer, True, has_looks)
+        shade_reflectors_kernel(tracer, False, has_looks)
     return [kernel for kernel in launch.KERNELS if kernel.func.__module__.startswith("ldtrefl.")]
 
 

@@ -6,7 +6,11 @@ import numpy as np
 import pytest
 
 import ldtrefl
-from ldtrefl.scene.mesh_scene import mesh_scene, parts_of_file, up_axis_of
+from ldtrefl.scene.layout import Layout
+from ldtrefl.scene.mesh_scene import FROM_Y_UP, mesh_scene, parts_of_file, up_axis_of
+from ldtrefl.scene.placement import UpAxis
+from ldtrefl.scene.studio import studio_lights
+from tests.scene.gltf.writer import Written
 
 OBJ = "v 0 0 0\nv 1 0 0\nv 0 2 0\nv 0 0 3\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 """A tetrahedron that is 1 long in x, 2 in y and 3 in z."""
@@ -61,3 +65,70 @@ def test_what_is_not_allowed_is_refused(file: Path, options: dict[str, object], 
 def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
     with pytest.raises(ldtrefl.InputError, match=r"none\.ply: no such mesh"):
         ldtrefl.load_scene(tmp_path / "none.ply")
+
+
+def gltf(folder: Path, **more: object) -> Path:
+    """A file with a rectangle, from (0, 0, 0) to (2, 1, 0), in a node with a name; y is up and its front +z."""
+    file = Written(**more)
+    file.add("nodes", {"mesh": file.quad(place=False), "name": "sign"})
+    return file.save(folder, "sign.gltf")
+
+
+def test_nodes_of_a_gltf_file_are_objects(tmp_path: Path) -> None:
+    scene = ldtrefl.load_scene(gltf(tmp_path), on="studio")
+    assert [entry.name for entry in scene.objects] == ["sign", "floor"]
+    np.testing.assert_array_equal(parts_box(gltf(tmp_path), "y"), [[0.0, 0.0, 0.0], [2.0, 0.0, 1.0]])
+
+
+def parts_box(path: Path, up: UpAxis) -> np.ndarray:
+    """(2, 3): where the objects of a file stand."""
+    return Layout.of(parts_of_file(path, up).objects).box
+
+
+@pytest.mark.parametrize("up", FROM_Y_UP)
+def test_a_gltf_file_stands_upright_as_any_other_does(tmp_path: Path, up: UpAxis) -> None:
+    """Whatever points up in it comes to +z, by the same turn as of one object with ``up_axis``."""
+    path = gltf(tmp_path)
+    one = parts_of_file(path, up, as_one=True)
+    assert len(one.objects) == 1 and one.objects[0].name == "sign"
+    box, whole = parts_box(path, up), Layout.of(one.objects).box
+    np.testing.assert_allclose(box, whole, atol=1e-12)
+
+
+def test_its_own_camera_and_lights_count_without_a_stage(tmp_path: Path) -> None:
+    """A camera 5 in front of the rectangle, a light of pi lux from the front, and little else: the picture has
+    their colours."""
+    path = gltf(
+        tmp_path,
+        cameras=[{"type": "perspective", "perspective": {"yfov": 0.5, "znear": 0.1, "aspectRatio": 1.5}}],
+        extensionsUsed=["KHR_lights_punctual"],
+        extensions={
+            "KHR_lights_punctual": {"lights": [{"type": "directional", "intensity": np.pi, "color": [1, 0.5, 0]}]}
+        },
+        nodes=[
+            {"camera": 0, "translation": [1.0, 0.5, 5.0]},
+            {"extensions": {"KHR_lights_punctual": {"light": 0}}},
+        ],
+    )
+    alone = ldtrefl.load_scene(path, size=(30, 20))
+    np.testing.assert_allclose(alone.camera.eye, [1.0, -5.0, 0.5])
+    assert len(alone.lights) == 1 and alone.lights[0].radiance == pytest.approx((1.0, 0.5, 0.0))
+    middle = ldtrefl.render(alone).image[10, 15]
+    np.testing.assert_allclose(middle / middle[0], np.array([1.05, 0.55, 0.05]) / 1.05, rtol=1e-3)
+    staged = ldtrefl.load_scene(path, on="studio", size=(30, 20))
+    assert staged.lights == studio_lights() and staged.camera.eye != alone.camera.eye
+
+
+def test_what_a_file_requires_and_is_not_read_is_refused_or_left_out(tmp_path: Path) -> None:
+    path = gltf(tmp_path, extensionsUsed=["EXT_none"], extensionsRequired=["EXT_none"])
+    with pytest.raises(ldtrefl.InputError, match="it requires EXT_none, which is not read"):
+        ldtrefl.load_scene(path)
+    for options in ({}, {"on": "chrome"}):
+        assert ldtrefl.load_scene(path, lenient=True, **options).objects[0].name == "sign"
+
+
+def test_a_name_that_is_no_text_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "\udcff.obj"
+    path.write_text(OBJ)
+    with pytest.raises(ldtrefl.InputError, match="a mesh file's name must be text in UTF-8"):
+        ldtrefl.load_scene(path)

@@ -10,8 +10,10 @@ import pytest
 import ldtrefl
 from ldtrefl import Environment, Light, Material, Mesh, Object, Reflection, Scene
 from ldtrefl.scene.composed import composed
-from ldtrefl.scene.scene_text import COMMENTS, check_scene_writable, save_scene, scene_text
+from ldtrefl.scene.mesh_scene import include_of, mesh_scene
+from ldtrefl.scene.scene_text import check_scene_writable, save_scene, scene_text
 from ldtrefl.scene.stages import STAGES
+from tests.scene.gltf.writer import Written
 
 OBJ = "v 0 0 0\nv 1 0 0\nv 0 2 0\nv 0 0 3\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 
@@ -72,9 +74,6 @@ def test_a_key_is_explained_where_it_comes_first() -> None:
     for comment in ("what a ray sees that hits nothing", "the way the light travels", "specular reflectance"):
         assert text.count(comment) == 1
     written = tomllib.loads(text)
-    for key in COMMENTS:
-        table, _, name = key.rpartition(".")
-        assert table == "" or table in ("camera", "lighting", "light", "object", "object.material"), name
     assert [entry.get("name") for entry in written["object"]][1:3] == ["floor", "mirror ball"]
 
 
@@ -97,3 +96,33 @@ def test_where_it_cannot_be_written_is_said(tmp_path: Path) -> None:
     (tmp_path / "b.toml").mkdir()
     with pytest.raises(ldtrefl.InputError, match="is a folder"):
         check_scene_writable(tmp_path / "b.toml")
+
+
+def test_what_a_gltf_file_holds_is_included(tmp_path: Path) -> None:
+    """Its nodes stand where they stood, in the same picture to the last bit."""
+    file = Written()
+    mesh = file.quad()
+    for x, y in ((3.0, 0.0), (0.0, 2.0)):
+        file.add("nodes", {"mesh": mesh, "translation": [x, y, 0.1], "rotation": [0.0, 0.6, 0.0, 0.8]})
+    path = file.save(tmp_path)
+    for up in ("y", "-x"):
+        scene = mesh_scene(path, "mirror-ball", up, size=(36, 24))
+        save_scene(tmp_path / "made.toml", scene, include_of(path, up))
+        again = ldtrefl.load_scene(tmp_path / "made.toml")
+        assert len(again.objects) == len(scene.objects) == 3 + 4
+        np.testing.assert_array_equal(ldtrefl.render(again).image, ldtrefl.render(scene).image)
+    mirrors = composed(scene.objects[:3], None, mirror_self=True)
+    with pytest.raises(ldtrefl.InputError, match="is in no file that a scene could name"):
+        save_scene(tmp_path / "made.toml", mirrors, include_of(path, "y"))
+
+
+def test_the_mirror_that_is_made_of_a_gltf_file_is_written(tmp_path: Path) -> None:
+    file = Written()
+    file.quad()
+    path = file.save(tmp_path)
+    scene = mesh_scene(path, "chrome", size=(36, 24))
+    save_scene(tmp_path / "made.toml", scene, include_of(path, "y"))
+    assert "[[include]]" not in (tmp_path / "made.toml").read_text()
+    np.testing.assert_array_equal(
+        ldtrefl.render(ldtrefl.load_scene(tmp_path / "made.toml")).image, ldtrefl.render(scene).image
+    )

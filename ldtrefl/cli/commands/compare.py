@@ -11,6 +11,7 @@ import typer
 from ldtrefl.base.errors import InputError, printable
 from ldtrefl.cli.options import (
     Device,
+    Lenient,
     Memory,
     Mirror,
     On,
@@ -59,6 +60,7 @@ def compare(
     up: Up = None,
     mirror: Mirror = None,
     size: Size = None,
+    lenient: Lenient = False,
     device: Device = None,
     threads: Threads = None,
     memory: Memory = None,
@@ -69,7 +71,7 @@ def compare(
     names = [name.strip() for name in methods.split(",") if name.strip()]
     options = _options_by_method(settings, [reference, *names])
     folder = writable_folder(output or Path(scene.stem + "-compare"), make=True)
-    loaded = scene_of(scene, on, up, mirror, size)
+    loaded = scene_of(scene, on, up, mirror, size, lenient)
     rows: dict[str, Row] = {}
     with progress_bar():
         _, truth = timed_frame(loaded, reference, device, options[reference])

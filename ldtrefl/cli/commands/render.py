@@ -16,6 +16,7 @@ from ldtrefl.base.errors import InputError
 from ldtrefl.cli.options import (
     CacheFolder,
     Device,
+    Lenient,
     Memory,
     Mirror,
     On,
@@ -53,6 +54,7 @@ def render(
     up: Up = None,
     mirror: Mirror = None,
     size: Size = None,
+    lenient: Lenient = False,
     scene_file: Annotated[
         Path | None,
         typer.Option("--save-scene", metavar="TOML", help="Write what a mesh is put on as a scene file."),
@@ -80,7 +82,7 @@ def render(
         if is_scene_file(scene):
             raise InputError(f"--save-scene goes with a mesh file, {scene} is a scene file")
     with _maps_kept(cache, no_cache), budget.account():
-        loaded = scene_of(scene, on, up, mirror, size)
+        loaded = scene_of(scene, on, up, mirror, size, lenient)
         if scene_file is not None:
             save_scene(scene_file, loaded, include_of(scene, up_axis_of(scene, up)))
         options = parsed_settings(settings)

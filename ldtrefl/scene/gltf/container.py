@@ -212,7 +212,9 @@ def _chunks(data: bytes) -> tuple[bytes, bytes | None]:
     """(the JSON, the binary chunk if there is one) of a binary file (4.4)."""
     version, length = (int.from_bytes(data[at : at + 4], "little") for at in (4, 8))
     if len(data) < HEADER + CHUNK_HEADER or version != 2:
-        raise InputError(f"a binary glTF of version 2 is read, got version {version}" if len(data) >= 8 else "cut off")
+        raise InputError(
+            f"a binary glTF of version 2 is read, got version {version}" if len(data) >= 8 else "it is cut off"
+        )
     end = min(length, len(data))
     if length > len(data):
         raise InputError(f"it is cut off: {length} bytes are announced, and {len(data)} are there")

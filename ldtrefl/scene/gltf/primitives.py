@@ -158,7 +158,7 @@ def _faces(
 ) -> np.ndarray:
     """(m, 3) int64 triangles of a list, a strip or a fan (3.7.2.1)."""
     if unpacked is not None:
-        indices = unpacked.astype(np.int64)
+        indices, mode = unpacked.astype(np.int64), TRIANGLES  # what is unpacked are triangles, whatever they were
     elif entry.get("indices") is not None:
         indices = elements(document, entry["indices"], f"{where}.indices")
         if indices.ndim != 1 or indices.dtype.kind != "u":

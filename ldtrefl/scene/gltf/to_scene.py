@@ -5,6 +5,7 @@ glTF is y up and metres; its light is in lux and candela, and a white surface se
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import math
 from collections.abc import Iterator
@@ -68,18 +69,40 @@ def scene_parts(path: Path, *, up: str = "z", lenient: bool = False) -> ScenePar
     """
     turn = np.eye(4)
     turn[:3, :3] = UPRIGHT[up]
-    try:
-        with budget.account(), np.errstate(all="ignore"):
-            data, beside = _only_file(path)
-            asset = Asset.read(data, beside, lenient=lenient)
-            parts, lines = _Builder(asset, turn).parts()
-    except InputError as error:
-        raise error.within(str(path)) from None
-    except Exception as error:  # whatever a damaged file provokes in a reader is the file's fault
-        raise InputError(f"{path}: not a scene that can be read ({type(error).__name__}: {error})") from error
+    with faults_of(path):
+        asset = read_asset(path, lenient=lenient)
+        parts, lines = _Builder(asset, turn).parts()
     for line in [*asset.not_shown(), *lines]:
         _log.warning("%s: not shown: %s", path, printable(line))
     return parts
+
+
+@contextlib.contextmanager
+def faults_of(path: Path) -> Iterator[None]:
+    """Whatever a damaged file provokes inside this block is the file's fault, and names it.
+
+    Raises:
+        InputError: in one line.
+    """
+    try:
+        with budget.account(), np.errstate(all="ignore"):
+            yield
+    except InputError as error:
+        raise error.within(str(path)) from None
+    except Exception as error:
+        raise InputError(f"{path}: not a scene that can be read ({type(error).__name__}: {error})") from error
+
+
+def read_asset(path: Path, *, lenient: bool = False) -> Asset:
+    """The asset in a glTF file, or in an archive with one. Its meshes and materials are read when they are asked for.
+
+    Raises:
+        InputError: there is no such file, or it is no glTF 2.0.
+    """
+    if not path.is_file():
+        raise InputError("no such file")
+    data, beside = _only_file(path)
+    return Asset.read(data, beside, lenient=lenient)
 
 
 def _only_file(path: Path) -> tuple[bytes, Beside]:

@@ -1,11 +1,16 @@
-"""Mesh files in many formats, read by trimesh and checked.
+"""Mesh files in many formats -> one checked mesh. ``docs/mesh_files.md`` says what is read of each, and why so.
 
     mesh_files.py       load_mesh: a file, or those in an archive -> one mesh
     archives.py         the mesh files in a file
     memory.py           how much memory reading one takes
-    polygon_files.py    polygons -> triangles, in OBJ and OFF files, and ply_polygons.py in PLY files; polygons.py cuts
-    pieces.py           a file -> pieces of one material each
-    joining.py          pieces -> one mesh
+    obj.py, mtl.py      OBJ files, whose text obj_text.py reads, and their materials
+    ply.py, off.py, threemf.py
+                        PLY (its tables: ply_tables.py), OFF and 3MF files
+    trimesh_pieces.py   the kinds that trimesh reads
+    pictures.py         the pictures that files name
+    polygons.py         polygons -> triangles
+
+Every reader gives pieces, which ``scene/joining.py`` joins, and what they do not show of the file, a line each.
 
 Imports ``mesh.py`` and ``normals.py`` of its room and what is below it. Start with ``mesh_files.py``.
 """

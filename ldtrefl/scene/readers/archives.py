@@ -7,7 +7,7 @@ import gzip
 import io
 import tarfile
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path, PurePosixPath
 from typing import BinaryIO, cast
 
@@ -17,8 +17,14 @@ from trimesh.exchange.load import mesh_formats
 from ldtrefl.base import budget
 from ldtrefl.base.errors import InputError
 
-ARCHIVES = (".zip", ".tar.gz", ".tar.bz2", ".bz2")
-"""How the names of archives end."""
+ARCHIVES = (".zip", ".tar.gz", ".tgz", ".tar.bz2", ".bz2", ".gz")
+"""How the names of archives end, longer endings first."""
+
+PACKED_ALONE: dict[str, Callable] = {".gz": gzip.open, ".bz2": bz2.open}
+"""Of a single file; what that names stands beside the archive."""
+
+OWN_KINDS = ("3mf", "obj", "off", "ply")
+"""What our own readers read, besides glTF."""
 
 MOST_MEMBERS = 10_000
 """Files in an archive: a directory entry is small in the archive and large in memory."""
@@ -67,13 +73,30 @@ def mesh_files(path: str) -> Iterator[tuple[bytes, str, resolvers.Resolver]]:
         budget.take(Path(path).stat().st_size, "the file")
         yield Path(path).read_bytes(), _kind(path), _FilesBeside(path)
         return
-    members = {".zip": _zip_members, ".bz2": _bz2_members}.get(kind, _tar_members)(path)
+    if kind in PACKED_ALONE:
+        name = path[: -len(kind)]
+        _check_kinds([name])
+        with PACKED_ALONE[kind](path) as stream:
+            yield _unpacked(cast(BinaryIO, stream)).getvalue(), _kind(name), _FilesBeside(path)
+        return
+    members = _zip_members(path) if kind == ".zip" else _tar_members(path)
     beside = resolvers.ZipResolver({name: io.BytesIO(data) for name, data in members.items()})
-    found = [name for name in members if _kind(name) in mesh_formats() and not _is_hidden(name)]
-    if not found:
-        raise InputError(f"no mesh file in the archive (read are {', '.join(sorted(mesh_formats()))})")
-    for name in found:
+    for name in _check_kinds(members):
         yield members[name], _kind(name), beside
+
+
+def mesh_kinds() -> list[str]:
+    """How the names of mesh files may end."""
+    return sorted({*mesh_formats(), *OWN_KINDS})
+
+
+def _check_kinds(names: Iterable[str]) -> list[str]:
+    """Those of an archive's files that are meshes."""
+    kinds = mesh_kinds()
+    found = [name for name in names if _kind(name) in kinds and not _is_hidden(name)]
+    if not found:
+        raise InputError(f"no mesh file in the archive (read are {', '.join(kinds)})")
+    return found
 
 
 def _kind(name: str) -> str:
@@ -106,11 +129,6 @@ def _tar_members(path: str) -> dict[str, bytes]:
                 file = archive.extractfile(entry)
                 members[entry.name] = b"" if file is None else file.read()
         return members
-
-
-def _bz2_members(path: str) -> dict[str, bytes]:
-    with bz2.open(path) as stream:
-        return {Path(path).stem: _unpacked(cast(BinaryIO, stream)).getvalue()}
 
 
 def _unpacked(stream: BinaryIO) -> io.BytesIO:

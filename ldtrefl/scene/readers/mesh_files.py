@@ -1,6 +1,8 @@
-"""Mesh files of any kind that trimesh reads -> :class:`Mesh`, with normals, texture coordinates, colours and textures.
+"""Mesh files of any kind -> :class:`Mesh`, with normals, texture coordinates, colours, materials and textures.
 
-    a file, or those in an archive -> in triangles -> pieces -> one mesh
+    a file, or those in an archive -> the reader of its kind -> pieces -> one mesh
+
+What a file says and its mesh does not show is named, in a line each.
 
 Nothing is unpacked or read before the memory that it may take is asked for (``memory.py``).
 """
@@ -13,7 +15,7 @@ import weakref
 from pathlib import Path
 
 import numpy as np
-from trimesh.exchange.load import mesh_formats
+from trimesh.resolvers import Resolver
 
 from ldtrefl.base import budget
 from ldtrefl.base.errors import InputError, printable
@@ -24,10 +26,13 @@ from ldtrefl.scene.gltf.pieces import placed_pieces
 from ldtrefl.scene.joining import joined_mesh, joining_bytes
 from ldtrefl.scene.mesh import Mesh
 from ldtrefl.scene.piece import Piece
-from ldtrefl.scene.readers.archives import ARCHIVES, archive_kind, mesh_files
+from ldtrefl.scene.readers.archives import ARCHIVES, archive_kind, mesh_files, mesh_kinds
 from ldtrefl.scene.readers.memory import reading_bytes
-from ldtrefl.scene.readers.pieces import pieces_of
-from ldtrefl.scene.readers.polygon_files import has_polygons
+from ldtrefl.scene.readers.obj import pieces_of_obj
+from ldtrefl.scene.readers.off import pieces_of_off
+from ldtrefl.scene.readers.ply import pieces_of_ply
+from ldtrefl.scene.readers.threemf import pieces_of_3mf
+from ldtrefl.scene.readers.trimesh_pieces import pieces_by_trimesh
 from ldtrefl.scene.readers.trimesh_warnings import trimesh_warnings
 
 _log = logging.getLogger("ldtrefl")
@@ -37,7 +42,7 @@ GLTF = ("glb", "gltf")
 
 
 def load_mesh(path: str | Path) -> Mesh:
-    """Read any file that trimesh reads, an archive of such files too; base colours and textures come along.
+    """Read a mesh file of any kind, an archive of such files too; materials and textures come along.
 
     The same file is read once, and again only when it has changed.
 
@@ -70,8 +75,8 @@ _needed: weakref.WeakKeyDictionary[Mesh, int] = weakref.WeakKeyDictionary()
 @shared_while_used
 def _load_mesh(path: str, _modified: int, _size: int) -> Mesh:
     """The mesh of a file as it stands: the time of its last change and its size tell whether it is the same."""
-    if archive_kind(path) is None and Path(path).suffix.lower().lstrip(".") not in mesh_formats():
-        kinds = ", ".join(sorted([*mesh_formats(), *(ending.lstrip(".") for ending in ARCHIVES)]))
+    if archive_kind(path) is None and Path(path).suffix.lower().lstrip(".") not in mesh_kinds():
+        kinds = ", ".join(sorted([*mesh_kinds(), *(ending.lstrip(".") for ending in ARCHIVES)]))
         raise InputError(f"{path}: not a kind of mesh file that can be read (allowed: {kinds})")
     # What NumPy would warn of ends in a check of the mesh.
     with budget.account(), np.errstate(all="ignore"):
@@ -91,22 +96,36 @@ def _read_pieces(path: str) -> tuple[list[Piece], float]:
     pieces: list[Piece] = []
     taken = 0.0
     for data, kind, beside in mesh_files(path):
-        if kind in GLTF:
-            asset = Asset.read(data, beside.get)
-            pieces += placed_pieces(asset)
-            for line in asset.not_shown():
-                _log.warning("%s: not shown: %s", path, printable(line))
-            continue
-        polygons = has_polygons(data, kind)
-        needed = reading_bytes(data, kind, polygons=polygons)
-        budget.take(needed, f"reading it as {kind}")
-        taken += needed
-        with trimesh_warnings() as warnings:
-            pieces += pieces_of(data, kind, beside, polygons=polygons)
-        if warnings and kind.startswith("stl"):
-            raise InputError(f"not a mesh that can be read ({warnings[0]})")
-        for line in warnings:
-            _log.warning("%s: %s", path, " ".join(line.split()))
+        if kind not in GLTF:
+            needed = reading_bytes(data, kind)
+            budget.take(needed, f"reading it as {kind}")
+            taken += needed
+        found, not_shown = _read(data, kind, beside)
+        pieces += found
+        for line in dict.fromkeys(not_shown):
+            _log.warning("%s: not shown: %s", path, printable(line))
     if not pieces:
         raise InputError("the mesh has no triangles")
     return pieces, taken
+
+
+def _read(data: bytes, kind: str, beside: Resolver) -> tuple[list[Piece], list[str]]:
+    """(the pieces of a mesh file of some kind, what it holds that they do not show)."""
+    if kind in GLTF:
+        asset = Asset.read(data, beside.get)
+        return placed_pieces(asset), asset.not_shown()
+    if kind == "off":
+        return pieces_of_off(data)
+    if kind == "3mf":
+        return pieces_of_3mf(data)
+    reader = {"obj": pieces_of_obj, "ply": pieces_of_ply}.get(kind)
+    return reader(data, beside.get) if reader else _read_by_trimesh(data, kind, beside)
+
+
+def _read_by_trimesh(data: bytes, kind: str, beside: Resolver) -> tuple[list[Piece], list[str]]:
+    """The same of kinds without a reader of our own."""
+    with trimesh_warnings() as warnings:
+        pieces, not_shown = pieces_by_trimesh(data, kind, beside)
+    if warnings and kind.startswith("stl"):
+        raise InputError(f"not a mesh that can be read ({warnings[0]})")
+    return pieces, not_shown + [" ".join(line.split()) for line in warnings]

@@ -7,6 +7,7 @@ import numpy as np
 import trimesh
 
 from tests.cli.conftest import Done
+from tests.scene.gltf.writer import Written
 
 
 def test_a_scene(run: Callable[..., Done]) -> None:
@@ -27,3 +28,15 @@ def test_closed_and_open_meshes(run: Callable[..., Done], scene_folder: Path) ->
 def test_memory_that_is_allowed(run: Callable[..., Done]) -> None:
     assert "2.0 GiB allowed" in run("info", "scene.toml", "--memory", "2G").output
     assert run("info", "scene.toml", "--memory", "1K").status == 2
+
+
+def test_a_gltf_file_lists_its_nodes(run: Callable[..., Done], scene_folder: Path) -> None:
+    file = Written()
+    file.quad()
+    file.tree["nodes"][0]["name"] = "sheet"
+    file.save(scene_folder)
+    done = run("info", "a.glb")
+    assert done.status == 0 and "sheet" in done.output
+    (scene_folder / "b.glb").write_bytes(b"glTF")
+    done = run("info", "b.glb")
+    assert done.status == 2 and done.errors == ["ldtrefl: b.glb: it is cut off"]

@@ -27,11 +27,11 @@ def packed(path: Path, name: str, data: bytes) -> Path:
             entry.size = len(data)
             archive.addfile(entry, io.BytesIO(data))
     else:
-        path.write_bytes(bz2.compress(data))
+        path.write_bytes(gzip.compress(data) if path.suffix == ".gz" else bz2.compress(data))
     return path
 
 
-ARCHIVES = ("a.zip", "a.tar.gz", "a.tar.bz2", "a.stl.bz2")
+ARCHIVES = ("a.zip", "a.tar.gz", "a.tar.bz2", "a.stl.bz2", "a.stl.gz")
 
 
 @pytest.mark.parametrize("name", ARCHIVES)
@@ -96,3 +96,23 @@ def test_files_beside_a_mesh_are_plain_files(tmp_path: Path) -> None:
     buffer.mkdir()
     with pytest.raises(InputError, match=rf"ball\.gltf: .*'{buffer.name}' beside it is not a file"):
         ldtrefl.load_mesh(tmp_path / "ball.gltf")
+
+
+@pytest.mark.parametrize("name", ["a.obj.gz", "a.obj.bz2", "a.zip"])
+def test_what_a_packed_mesh_names_is_beside_it(tmp_path: Path, name: str) -> None:
+    """Beside the archive of a single file, and else in the archive."""
+    text = b"mtllib a.mtl\nusemtl red\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+    packed(tmp_path / name, "a.obj", text)
+    materials = b"newmtl red\nKd 1 0 0\n"
+    if name == "a.zip":
+        with zipfile.ZipFile(tmp_path / name, "a") as archive:
+            archive.writestr("a.mtl", materials)
+    else:
+        (tmp_path / "a.mtl").write_bytes(materials)
+    assert ldtrefl.load_mesh(tmp_path / name).parts[0].material.base_color == (1, 0, 0)
+
+
+def test_other_packed_files_are_no_meshes(tmp_path: Path) -> None:
+    (tmp_path / "a.txt.gz").write_bytes(gzip.compress(b"words"))
+    with pytest.raises(ldtrefl.InputError, match=r"a\.txt\.gz: no mesh file in the archive"):
+        ldtrefl.load_mesh(tmp_path / "a.txt.gz")

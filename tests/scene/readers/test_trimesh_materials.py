@@ -1,26 +1,27 @@
-"""trimesh's materials: base colours, linear, and pictures where there are coordinates for them."""
+"""trimesh's materials as ours: base colour and picture, if there are texture coordinates for it."""
+
+from types import SimpleNamespace
 
 import numpy as np
 from PIL import Image
-from trimesh.visual.material import PBRMaterial, SimpleMaterial
 
 from ldtrefl.scene.piece import Piece
 from ldtrefl.scene.readers.trimesh_materials import surface_material_of, with_materials
 from ldtrefl.scene.surface_material import PLAIN
 
 
-def test_base_colours_are_fractions() -> None:
+def test_a_material_of_trimesh() -> None:
+    picture = Image.new("RGB", (2, 2), (1, 2, 3))
+    given = SimpleNamespace(name="a", baseColorFactor=np.array([255, 0, 51, 255], np.uint8), baseColorTexture=picture)
+    made = surface_material_of(given)
+    assert made.name == "a" and made.base_color == (1.0, 0.0, 0.2)
+    assert made.base_texture is not None and (made.base_texture.picture.pixels == [1, 2, 3]).all()
     assert surface_material_of(None) is PLAIN
-    floats = surface_material_of(PBRMaterial(name="paint", baseColorFactor=np.array([0.5, 0.25, 1.0, 1.0])))
-    assert floats.base_color == (0.5, 0.25, 1.0) or np.allclose(floats.base_color, (0.5, 0.25, 1.0), atol=1 / 255)
-    assert floats.name == "paint" and floats.base_texture is None
-
-
-def test_a_picture_needs_coordinates() -> None:
-    picture = Image.fromarray(np.full((2, 2, 3), 7, np.uint8))
-    material = SimpleMaterial(image=picture)
-    corners, faces = np.eye(3), np.array([[0, 1, 2]])
-    with_uvs = Piece(corners, faces, None, np.zeros((3, 2), np.float32))
-    textured, plain = with_materials([(with_uvs, material), (Piece(corners, faces, None, None), material)])
-    assert textured.material.base_texture is not None and plain.material.base_texture is None
-    assert textured.material.base_texture.picture.pixels[0, 0].tolist() == [7, 7, 7]
+    vertices, faces = np.eye(3), np.array([[0, 1, 2]])
+    with_uvs, without = with_materials(
+        [
+            (Piece(vertices, faces, None, np.zeros((3, 2), np.float32)), given),
+            (Piece(vertices, faces, None, None), given),
+        ]
+    )
+    assert with_uvs.material.base_texture is not None and without.material.base_texture is None

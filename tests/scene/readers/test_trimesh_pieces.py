@@ -11,41 +11,6 @@ from tests.mesh_writers import write_glb
 from tests.scene.readers.soft_box import MESH, SCENE, soft_box
 
 
-@pytest.mark.parametrize("has_uvs", [True, False])
-@pytest.mark.parametrize("is_quads", [True, False])
-def test_an_obj_keeps_what_each_corner_has(tmp_path: Path, is_quads: bool, has_uvs: bool) -> None:
-    """Corners share positions, but neither texture coordinates nor normals."""
-    rng = np.random.default_rng(0)
-    box = trimesh.creation.box()
-    faces = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6]]) if is_quads else box.faces
-    size = faces.shape[1]
-    uvs, normals = rng.uniform(0, 1, (faces.size, 2)).round(4), rng.normal(size=(faces.size, 3))
-    normals = (normals / np.linalg.norm(normals, axis=1, keepdims=True)).round(4)
-    lines = [f"v {x} {y} {z}" for x, y, z in box.vertices]
-    lines += [f"vt {u} {v}" for u, v in uvs] if has_uvs else []
-    lines += [f"vn {x} {y} {z}" for x, y, z in normals]
-    for k, face in enumerate(faces):
-        corners = [size * k + j + 1 for j in range(size)]
-        words = [f"{v + 1}/{c if has_uvs else ''}/{c}" for v, c in zip(face, corners, strict=True)]
-        lines.append("f " + " ".join(words))
-    (tmp_path / "a.obj").write_text("\n".join(lines))
-    mesh = ldtrefl.load_mesh(tmp_path / "a.obj")
-    cut = np.array([[0, 1, 2], [2, 3, 0]] if is_quads else [[0, 1, 2]])
-    chosen = (size * np.arange(len(faces))[:, None, None] + cut).reshape(-1, 3)
-    np.testing.assert_array_equal(mesh.vertices[mesh.faces], box.vertices[faces.reshape(-1)[chosen]])
-    np.testing.assert_allclose(mesh.normals[mesh.faces], normals[chosen], atol=1e-3)
-    assert (mesh.uvs is not None) == has_uvs
-    if mesh.uvs is not None:
-        np.testing.assert_allclose(mesh.uvs[mesh.faces], uvs[chosen], atol=1e-6)
-
-
-def test_an_obj_may_have_a_mark_and_comments_of_any_letters(tmp_path: Path) -> None:
-    text = "# caf\u00e9\r\nv 0 0 0\r\nv 1 0 0\r\nv 0 1 0\r\nv 1 1 0\r\nf 1 2 4 3 # d\u00e9j\u00e0 vu\r\n"
-    for encoding in ("latin-1", "utf-8", "utf-8-sig"):
-        (tmp_path / "a.obj").write_bytes(text.encode(encoding))
-        assert len(ldtrefl.load_mesh(tmp_path / "a.obj").faces) == 2
-
-
 def test_nodes_place_normals_and_winding(tmp_path: Path) -> None:
     """A stretched and turned copy, and a mirrored one inside a moved node: the sphere's normals follow its surface."""
     ball = trimesh.creation.icosphere(3)
@@ -84,3 +49,27 @@ def test_normals_that_are_none_are_undefined(tmp_path: Path) -> None:
     np.testing.assert_allclose(
         mesh.normals[mesh.faces].reshape(-1, 3)[:4], [[0] * 3, [0] * 3, *normals[2:4]], atol=1e-6
     )
+
+
+@pytest.mark.parametrize("kind", ["stl", "stl_ascii"])
+def test_facets_of_stl_files_are_flat(tmp_path: Path, kind: str) -> None:
+    """A box stays a box: normals of 0 stand for the facet's."""
+    (tmp_path / "a.stl").write_bytes(np.bytes_(trimesh.creation.box().export(file_type=kind)))
+    mesh = ldtrefl.load_mesh(tmp_path / "a.stl")
+    assert len(mesh.faces) == 12 and not mesh.normals.any()
+    np.testing.assert_array_equal(np.sort(mesh.bounds, axis=0), [[-0.5] * 3, [0.5] * 3])
+
+
+def test_colors_of_stl_facets_are_named(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    """In the two bytes of a facet that are left: as Magics and as VisCAM say that they are colours."""
+    plain = trimesh.creation.box().export(file_type="stl")
+    (tmp_path / "plain.stl").write_bytes(plain)
+    (tmp_path / "magics.stl").write_bytes(b"COLOR=\1\2\3\4".ljust(80) + plain[80:])
+    rows = np.frombuffer(plain[84:], np.uint8).reshape(12, 50).copy()
+    rows[:, 48:] = [31, 128]
+    (tmp_path / "viscam.stl").write_bytes(plain[:84] + rows.tobytes())
+    for name in ("plain", "magics", "viscam"):
+        ldtrefl.load_mesh(tmp_path / f"{name}.stl")
+    assert [record.getMessage().rpartition("/")[2] for record in caplog.records] == [
+        f"{name}.stl: not shown: colours of facets" for name in ("magics", "viscam")
+    ]

@@ -1,49 +1,44 @@
-"""A mesh file in memory -> its pieces: runs of triangles with one material, where the file's scene places them.
+"""Mesh files of the kinds that trimesh reads here (STL, and those of its other readers that are installed) -> pieces.
 
-trimesh's readers read the file. What they return is walked here: each piece is placed by the nodes of the file's
+What they return is walked here: each piece is placed by the nodes of the file's
 scene, its normals by the inverse transpose, and a mirrored piece is wound the other way, so that it keeps its outside.
 """
 
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import trimesh
 from numpy.typing import ArrayLike
 from trimesh.exchange.load import mesh_loaders
 from trimesh.resolvers import Resolver
 
 from ldtrefl.scene.mesh import Mesh
 from ldtrefl.scene.piece import Piece, moved, unit_vectors
-from ldtrefl.scene.readers.ply_polygons import CORNER_LIST, FACES
-from ldtrefl.scene.readers.polygon_files import BYTE_ORDER_MARK, in_triangles
 from ldtrefl.scene.readers.polygons import triangles_of
 from ldtrefl.scene.readers.trimesh_materials import with_materials
-from ldtrefl.scene.welding import first_of_equals
+
+STL_HEADER, STL_ROW = 84, 50
+"""Bytes of a binary STL file before its triangles, and of each of them: its last two are a colour, if any program says
+so."""
+
+STL = ("stl", "stl_ascii")
 
 
-def pieces_of(data: bytes, kind: str, beside: Resolver, *, polygons: bool) -> list[Piece]:
-    """The pieces of a mesh file in the order of its nodes, where these place them.
+def pieces_by_trimesh(data: bytes, kind: str, beside: Resolver) -> tuple[list[Piece], list[str]]:
+    """The pieces of a mesh file in the order of its nodes, where these place them; what they do not show, a line each.
 
     Args:
         data: the file.
-        kind: how its name ends, such as 'obj' or 'glb'.
+        kind: how its name ends, such as 'stl'.
         beside: reads the files that it names.
-        polygons: it may hold polygons of more than three corners.
 
     Raises:
         InputError: a triangle has a vertex that there is not. Other exceptions: the file is damaged.
     """
-    options = {"fix_texture": False} if kind == "ply" else {}
-    if kind in ("obj", "off"):
-        data = _as_utf8(data)
-    if polygons:
-        data = in_triangles(data, kind)
-    read = mesh_loaders[kind](file_obj=io.BytesIO(data), file_type=kind, resolver=beside, metadata=None, **options)
-    if kind == "ply":
-        read = _split_by_texture(read)
+    read = mesh_loaders[kind](file_obj=io.BytesIO(data), file_type=kind, resolver=beside, metadata=None)
     if "geometry" not in read:
         geometry, nodes = {"": read}, [{"geometry": "", "frame_to": ""}]
     else:
@@ -51,18 +46,22 @@ def pieces_of(data: bytes, kind: str, beside: Resolver, *, polygons: bool) -> li
         nodes = read.get("graph") or [{"geometry": name, "frame_to": name} for name in geometry]
     found = {name: piece for name, entry in geometry.items() if (piece := _piece(entry)) is not None}
     own = dict(zip(found, with_materials(list(found.values())), strict=True))
+    if kind in STL:
+        # A facet is all that such a file knows: its normal counts.
+        own = {name: replace(piece, normals=np.zeros(piece.vertices.shape)) for name, piece in own.items()}
     placed = _placed([_node(node) for node in nodes], read.get("base_frame", "world"))
-    return [moved(own[name], matrix) for name, matrix in placed if name in own]
+    notes = ["colours of facets"] if kind in STL and _has_stl_colors(data) else []
+    return [moved(own[name], matrix) for name, matrix in placed if name in own], notes
 
 
-def _as_utf8(data: bytes) -> bytes:
-    """A text file without a byte order mark; what is not UTF-8, as some comments, is taken for Latin-1."""
-    data = data.removeprefix(BYTE_ORDER_MARK)
-    try:
-        data.decode()
-    except UnicodeDecodeError:
-        return data.decode("latin-1").encode()
-    return data
+def _has_stl_colors(data: bytes) -> bool:
+    """Whether a binary STL file says that its facets have colours: in its header as Magics does, or by the highest bit
+    of each as VisCAM does."""
+    count = int.from_bytes(data[80:84], "little")
+    if len(data) != STL_HEADER + STL_ROW * count or not count:
+        return False
+    rows = np.frombuffer(data, np.uint8, STL_ROW * count, STL_HEADER).reshape(count, STL_ROW)
+    return b"COLOR=" in data[:80] or bool((rows[:, -1] & 0x80).all())
 
 
 def _piece(entry: dict[str, Any]) -> tuple[Piece, object | None] | None:
@@ -140,30 +139,3 @@ def _matrix(node: dict[str, Any]) -> np.ndarray:
 def _product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """The product of two matrices. Not by BLAS, whose threads go on spinning afterwards."""
     return np.einsum("ij,jk->ik", a, b)
-
-
-def _split_by_texture(read: dict[str, Any]) -> dict[str, Any]:
-    """What trimesh reads of a PLY file, with texture coordinates of its triangles' corners, where it has such.
-
-    A vertex to which corners give different texture coordinates is doubled, with its normal, for each of them.
-    """
-    table = read.get("metadata", {}).get("_ply_raw", {}).get(FACES, {}).get("data")
-    names = table if isinstance(table, dict) else getattr(getattr(table, "dtype", None), "names", None) or ()
-    if table is None or CORNER_LIST not in names or read.get("faces") is None:
-        return read
-    pairs, faces = table[CORNER_LIST], np.asarray(read["faces"])
-    pairs = np.asarray(pairs["f1"] if pairs.dtype.names else pairs, np.float64)
-    if pairs.shape != (len(faces), 6) or not np.isfinite(pairs).all():
-        return read
-    corners = np.column_stack([faces.reshape(-1), pairs.reshape(-1, 2)]).astype(np.float64)
-    firsts = first_of_equals(corners)
-    if firsts is None:
-        firsts = np.arange(len(corners))
-    chosen, numbers = np.unique(firsts, return_inverse=True)
-    result = {**read, "faces": numbers.reshape(faces.shape)}
-    for name in ("vertices", "vertex_normals"):
-        if read.get(name) is not None:
-            result[name] = np.asarray(read[name])[faces.reshape(-1)[chosen]]
-    material = getattr(read.get("visual"), "material", None)
-    result["visual"] = trimesh.visual.TextureVisuals(uv=corners[chosen, 1:], material=material)
-    return result

@@ -1,0 +1,41 @@
+"""Faces whose corners have more than their vertices: a vertex is doubled for each set of values that it is given."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ldtrefl.scene.piece import Piece
+from ldtrefl.scene.welding import first_of_equals
+
+
+def split_corners(faces: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Corners of one vertex stay one where all their values are equal.
+
+    Args:
+        faces: (m, 3) numbers of vertices.
+        values: (3 m, k) float, what each corner has.
+
+    Returns:
+        (n,) numbers of corners, one for each new vertex, in the order of the file, and (m, 3) faces of those.
+    """
+    firsts = first_of_equals(np.column_stack([faces.reshape(-1), values]).astype(np.float64))
+    if firsts is None:
+        every = np.arange(faces.size)
+        return every, every.reshape(faces.shape)
+    is_first = firsts == np.arange(len(firsts), dtype=firsts.dtype)
+    numbers = np.cumsum(is_first) - 1
+    return np.flatnonzero(is_first), numbers[firsts].reshape(faces.shape)
+
+
+def with_vertices(piece: Piece, chosen: np.ndarray, faces: np.ndarray) -> Piece:
+    """A piece with some of its vertices, each once or more often.
+
+    Args:
+        piece: it has no tangents and no second texture coordinates, which the kinds of files here do not store.
+        chosen: (n,) numbers of its vertices.
+        faces: (m, 3) numbers of those.
+    """
+    normals, uvs, colors = (None if of is None else of[chosen] for of in (piece.normals, piece.uvs, piece.colors))
+    return replace(piece, vertices=piece.vertices[chosen], faces=faces, normals=normals, uvs=uvs, colors=colors)

@@ -1,0 +1,92 @@
+"""What kernels read of looks: materials in glTF's terms, one for each part of a mesh, and their textures.
+
+Objects whose surface is one colour, a picture or a mirror have no look: ``ObjectRecord`` says all of them.
+"""
+
+from __future__ import annotations
+
+import warp as wp
+
+BASE = wp.constant(0)
+"""Slot of the base colour and alpha among a material's textures; the other slots follow."""
+METALLIC_ROUGHNESS = wp.constant(1)
+NORMAL = wp.constant(2)
+OCCLUSION = wp.constant(3)
+EMISSION = wp.constant(4)
+SPECULAR = wp.constant(5)
+SPECULAR_COLOR = wp.constant(6)
+CLEARCOAT = wp.constant(7)
+CLEARCOAT_ROUGHNESS = wp.constant(8)
+SLOTS = wp.constant(9)
+
+SlotNumbers = wp.types.vector(length=9, dtype=wp.int32)  # type: ignore[no-untyped-call]
+
+OPAQUE = wp.constant(0)
+"""Modes of alpha."""
+MASK = wp.constant(1)
+BLEND = wp.constant(2)
+
+LINEAR_FLOATS = wp.constant(0)
+"""How texels are stored."""
+SRGB_BYTES = wp.constant(1)
+FRACTION_BYTES = wp.constant(2)
+
+REPEAT = wp.constant(0)
+"""What lies beyond a picture."""
+CLAMP = wp.constant(1)
+MIRROR = wp.constant(2)
+
+
+@wp.struct
+class TextureRecord:
+    """A picture, and how it is laid on a surface."""
+
+    first: int  # its first texel, row 0 at the top
+    width: int
+    height: int
+    stored: int  # LINEAR_FLOATS, SRGB_BYTES or FRACTION_BYTES
+    first_alpha: int  # the alpha of its first texel; -1 if it is opaque
+    uv_set: int
+    wrap: wp.vec2i  # along u and v
+    is_nearest: int
+    across: wp.vec3  # the picture is read at across . (u, v, 1), with v = 0 and 0 at its top row,
+    down: wp.vec3  # and down . (u, v, 1)
+
+
+@wp.struct
+class MaterialRecord:
+    """What a part of a mesh looks like: the fields of ``SurfaceMaterial``, with what the scene says of the object."""
+
+    base: wp.vec3
+    alpha: float
+    alpha_mode: int  # OPAQUE, MASK or BLEND
+    alpha_cutoff: float
+    emission: wp.vec3
+    is_unlit: int
+    normal_scale: float
+    occlusion_strength: float
+    slots: int  # texture slots that are looked at: up to the last one with a texture
+    textures: SlotNumbers  # among the look's; -1 for none
+
+
+@wp.struct
+class LookRecord:
+    """The materials and textures of a mesh's parts, and what its vertices have beside ``ObjectRecord``."""
+
+    uvs: wp.array(dtype=wp.vec2)  # v = 0 at the bottom; empty without any
+    second_uvs: wp.array(dtype=wp.vec2)  # likewise
+    colors: wp.array(dtype=wp.vec4)  # linear, with alpha; empty without any
+    tangents: wp.array(dtype=wp.vec4)  # along u in unit space, then the bitangent's sign; empty without any
+    materials: wp.array(dtype=MaterialRecord)  # of each part
+    textures: wp.array(dtype=TextureRecord)
+    texels: wp.array(dtype=wp.vec3)  # of pictures of floats, linear
+    texel_bytes: wp.array(dtype=wp.vec3ub)  # of pictures of 8 bits
+    texel_alpha: wp.array(dtype=wp.uint8)
+
+
+@wp.struct
+class Looks:
+    """The looks of a scene's objects."""
+
+    records: wp.array(dtype=LookRecord)
+    decoded: wp.array(dtype=float)  # the linear value of every byte of sRGB
