@@ -7,6 +7,7 @@ three-quarter view sees it (``framing.py``), and above the floor, which is under
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -19,7 +20,13 @@ from ldtrefl.scene.layout import CORNERS, Layout
 from ldtrefl.scene.tidy import decimals_for, tidy, tidy_below, tidy_point
 
 MOST_POINTS = 4_000_000
-"""Of objects with more vertices, their boxes' corners are measured: a tenth of a gigabyte."""
+"""Of objects with more vertices, some are measured, and the corners of their boxes: a tenth of a gigabyte."""
+
+STEPS = 40
+"""Triangles with edges longer than the size over this are measured inside, too: a ball may not stand in a wall."""
+
+AT_ONCE = 1 << 16
+"""Triangles that are measured at a time."""
 
 SUNK = 1.0 / 2000.0
 """How far below the lowest point the floor is, as a share of the size: it must not coincide with a flat base."""
@@ -37,7 +44,7 @@ class Subject:
     """Objects, measured."""
 
     points: np.ndarray
-    """(n, 3) float64, in the world: their vertices, or the corners of their boxes."""
+    """(n, 3) float64, in the world: points all over their surfaces, and all their corners."""
 
     @classmethod
     def of(cls, objects: Sequence[Object]) -> Subject:
@@ -50,15 +57,24 @@ class Subject:
             raise InputError("there is nothing to be seen: no object")
         layout = Layout.of(objects)
         count = sum(len(layout.meshes[number].vertices) for number in layout.mesh_of)
-        placed = []
+        stride = math.ceil(count / MOST_POINTS)
+        placed: list[np.ndarray] = []
         for number, matrix in zip(layout.mesh_of, layout.world_from_object, strict=True):
             mesh = layout.meshes[number]
-            if count <= MOST_POINTS:
-                own = mesh.vertices if mesh.is_used.all() else mesh.vertices[mesh.is_used]
+            if stride > 1:
+                corners = np.where(CORNERS == 0, mesh.bounds[0], mesh.bounds[1])
+                own = np.concatenate([corners, mesh.vertices[mesh.is_used][::stride]])
             else:
-                own = np.where(CORNERS == 0, mesh.bounds[0], mesh.bounds[1])
+                own = mesh.vertices
             placed.append(np.einsum("ij,kj->ik", own, matrix[:3, :3]) + matrix[:3, 3])
-        return cls(np.concatenate(placed))
+        if stride > 1:
+            return cls(np.concatenate(placed))
+        used = [points[layout.meshes[number].is_used] for number, points in zip(layout.mesh_of, placed, strict=True)]
+        box = np.array([[part.min(axis=0), part.max(axis=0)] for part in used])
+        step = float((box[:, 1].max(axis=0) - box[:, 0].min(axis=0)).max()) / STEPS
+        for number, points in zip(layout.mesh_of, placed, strict=True):
+            used += _inside_large(points, layout.meshes[number].faces, step)
+        return cls(np.concatenate(used))
 
     @functools.cached_property
     def _extents(self) -> np.ndarray:
@@ -143,3 +159,28 @@ class Subject:
         met = reach > 0.0
         distance = float((along[met] + np.sqrt(reach[met])).max(initial=radius))
         return self.at(distance * np.cos(angle), distance * np.sin(angle), radius)
+
+
+def _inside_large(vertices: np.ndarray, faces: np.ndarray, step: float) -> list[np.ndarray]:
+    """(n, 3) points on those triangles that have an edge longer than ``step``, no farther apart than that, in parts.
+
+    A triangle whose longest edge is k steps is cut in k parts along each edge. So that there are not too many, k is at
+    most ``STEPS`` over the square root of how many hundreds of large triangles there are.
+    """
+    large, longest = [np.empty((0, 3, 3))], [np.empty(0)]
+    for begin in range(0, len(faces), AT_ONCE):
+        corners = vertices[faces[begin : begin + AT_ONCE]]
+        edges = corners - np.roll(corners, 1, axis=1)
+        lengths = np.sqrt(np.einsum("ijk,ijk->ij", edges, edges)).max(axis=1)
+        large.append(corners[lengths > step])
+        longest.append(lengths[lengths > step])
+    corners, lengths = np.concatenate(large), np.concatenate(longest)
+    most = max(2, round(2 * STEPS / math.sqrt(1.0 + len(corners) / 100.0)))
+    parts = np.minimum(np.ceil(lengths / step), most).astype(int)
+    found = []
+    for k in np.unique(parts):
+        first, second = (axis.ravel() for axis in np.meshgrid(range(k + 1), range(k + 1)))
+        inside = first + second <= k
+        weights = np.stack([first, second, k - first - second], axis=1)[inside] / k
+        found.append(np.einsum("wc,tcx->twx", weights, corners[parts == k]).reshape(-1, 3))
+    return found

@@ -24,13 +24,40 @@ def test_objects_are_measured_where_they_stand(most: int, monkeypatch: pytest.Mo
             Object(shape="box", scale=0.5, translate=(10.0, 0.0, 8.5)),
         ]
     )
-    assert subject.points.min(axis=0).tolist() == [9.0, -2.0, 1.0] and subject.height == 8.0
-    assert subject.points.max(axis=0).tolist() == [11.0, 2.0, 9.0]
+    reach = [subject.points.min(axis=0), subject.points.max(axis=0)]
+    np.testing.assert_allclose(reach, [[9.0, -2.0, 1.0], [11.0, 2.0, 9.0]], rtol=1e-12)
+    assert subject.height == pytest.approx(8.0)
     corners = np.array([[x, y] for x in (-1.0, 1.0) for y in (-2.0, 2.0)])
     assert subject.width == pytest.approx(np.ptp(corners @ subject.right[:2]))
     assert subject.depth == pytest.approx(np.ptp(corners @ subject.behind[:2]))
     np.testing.assert_allclose(subject.base, [10.0, 0.0, 1.0 - 8.0 * SUNK], atol=1e-3)
-    assert subject.base[2] < 1.0 and subject.size == 8.0 and subject.digits == 3
+    assert subject.base[2] < 1.0 and subject.size == pytest.approx(8.0) and subject.digits == 3
+
+
+def test_large_triangles_are_measured_inside() -> None:
+    """No point of a box is farther from all that is measured than a few hundredths of its size."""
+    points = Subject.of([Object(shape="box", translate=(1e3, 0.0, 0.0))]).points
+    rng = np.random.default_rng(0)
+    sides = rng.uniform(-1.0, 1.0, (200, 3))
+    sides[np.arange(200), rng.integers(0, 3, 200)] = rng.choice([-1.0, 1.0], 200)
+    distances = np.linalg.norm(points[None] - np.add(sides, (1e3, 0.0, 0.0))[:, None], axis=2).min(axis=1)
+    assert distances.max() < 0.05 and len(points) < 200_000
+    np.testing.assert_allclose([points.min(axis=0), points.max(axis=0)], [[999, -1, -1], [1001, 1, 1]], rtol=1e-12)
+
+
+def test_many_large_triangles_do_not_take_the_memory() -> None:
+    rng = np.random.default_rng(0)
+    mesh = Mesh(rng.normal(size=(3 * 20_000, 3)), np.arange(3 * 20_000).reshape(-1, 3))
+    assert len(Subject.of([Object(mesh=mesh)]).points) < 2_000_000
+
+
+def test_a_ball_does_not_stand_in_a_wall() -> None:
+    """A box whose side is as wide as the ball's way: in front of its middle it stands off the side."""
+    box = Object(shape="box", rotate=(0.0, 0.0, 1.0, -32.0))  # its sides face right and behind
+    subject = Subject.of([box])
+    for reached_over in (False, True):
+        centre = np.array(subject.beside(0.0, 0.2, 0.1, reached_over=reached_over))
+        np.testing.assert_allclose(centre - subject.base, [*(1.3 * subject.right[:2]), 0.2], atol=3e-3)
 
 
 def test_vertices_that_no_triangle_has_do_not_count() -> None:
