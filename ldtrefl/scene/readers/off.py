@@ -44,10 +44,12 @@ def _read(data: bytes) -> tuple[list[Piece], list[str]]:
     budget.take(BYTES_PER_TEXT_BYTE * len(data), "its lines")
     letters, lines = _lines(data)
     counts, words = lines.rows(_some(lines, 0, 1), 0, least=2)
-    vertex_count, face_count = int(max(counts[0], 0)), int(max(counts[1], 0))
     has_words = int((lines.ends > lines.starts).sum())
-    if 1 + vertex_count + face_count > has_words:
-        raise InputError(f"the file ends among its {vertex_count} vertices and {face_count} faces")
+    if not (counts[:2] >= 0).all() or 1 + counts[0] + counts[1] > has_words:
+        raise InputError(f"the file ends among its {counts[0]:.0f} vertices and {counts[1]:.0f} faces")
+    vertex_count, face_count = int(counts[0]), int(counts[1])
+    if vertex_count == 0 or face_count == 0:
+        raise InputError("the mesh has no triangles: it says that it has no vertices or no faces")
     values, words = lines.rows(_some(lines, 1, vertex_count), 0, least=3)
     if vertex_count and (words != words[0]).any():
         raise InputError("the lines of vertices have different numbers of words")
