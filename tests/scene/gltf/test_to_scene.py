@@ -103,4 +103,4 @@ def test_a_scene_of_its_objects_renders(tmp_path: Path) -> None:
     parts = scene_parts(file.save(tmp_path))
     camera = ldtrefl.Camera(eye=(1, -5, 0.5), look_at=(1, 0, 0.5), width=8, height=8, fov_y=5)
     image = ldtrefl.render(ldtrefl.Scene(camera=camera, objects=parts.objects), "bvh").image
-    assert image[4, 4, 0] > 0 and (image[4, 4, 1:] == 0).all()
+    assert image[4, 4, 0] > 0.1 and image[4, 4, 1:].max() < 1e-3  # red metal
