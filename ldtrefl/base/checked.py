@@ -66,7 +66,7 @@ Direction = Annotated[Vector, AfterValidator(_nonzero)]
 
 _Radiance = Annotated[Real, Field(ge=0.0, le=BRIGHTEST)]
 _Intensity = Annotated[Real, Field(ge=0.0, le=LARGEST)]
-_Fraction = Annotated[Real, Field(ge=0.0, le=1.0)]
+Fraction = Annotated[Real, Field(ge=0.0, le=1.0)]
 
 
 def _grey(channel: Any) -> BeforeValidator:
@@ -92,7 +92,7 @@ def _one_or_three(value: object) -> float | tuple[float, float, float]:
 
 Color = Annotated[tuple[_Radiance, _Radiance, _Radiance], _grey(_Radiance)]
 Intensity = Annotated[tuple[_Intensity, _Intensity, _Intensity], _grey(_Intensity)]
-Reflectance = Annotated[tuple[_Fraction, _Fraction, _Fraction], _grey(_Fraction)]
+Reflectance = Annotated[tuple[Fraction, Fraction, Fraction], _grey(Fraction)]
 Scale = Annotated[float | tuple[float, float, float], PlainValidator(_one_or_three)]  # a union names both faults
 _ONE_SIZE: TypeAdapter[Any] = TypeAdapter(Positive)
 _THREE_SIZES: TypeAdapter[Any] = TypeAdapter(tuple[Positive, Positive, Positive])

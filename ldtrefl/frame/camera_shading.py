@@ -72,11 +72,12 @@ def shade_pixels_kernel(tracer: Tracer, has_looks: bool) -> wp.Kernel:
 
 @wp.func
 def start_ray(rays: RayBuffer, i: int, objects: wp.array(dtype=ObjectRecord), surface: Surface, direction: wp.vec3):
-    """Start ray ``i`` at a surface that is seen along unit ``direction``, in the mirrored direction."""
+    """Start ray ``i`` at a surface that is seen along unit ``direction``, in the mirrored direction. It is dead where
+    the surface reflects nothing: a look may say so from place to place."""
     rays.origin[i] = surface.position
     rays.direction[i] = mirror_direction(direction, surface.normal, surface.facet)
     rays.throughput[i] = wp.vec3(1.0)
-    rays.source[i] = surface.object
+    rays.source[i] = wp.where(wp.max(surface.mirror) > 0.0, surface.object, -1)
     rays.source_triangle[i] = surface.triangle
     rays.may_return[i] = wp.where(may_return(objects[surface.object], surface), wp.uint8(1), wp.uint8(0))
 

@@ -142,6 +142,8 @@ def list_shown(
     for k in range(objects):
         met = wp.uint64(0)
         for i in range(begin, end):
+            if rays.source[i] < 0:
+                continue
             row = first_rows[rays.source[i]] + pixel_triangle[rays.pixel[i]]
             if (bits[row, k / 32] >> wp.uint32(k % 32)) & wp.uint32(1) != wp.uint32(0):
                 if rays.source[i] != k or rays.may_return[i] != wp.uint8(0):
@@ -166,7 +168,7 @@ def flat_regions(gbuffer: GBuffer, rays: RayBuffer, stats: Stats) -> Regions:
     budget.take(4 * total * words, f"cull=flat of {total} triangles and {count} objects", "their number, or cull=safe")
     bits = wp.zeros((total, words), dtype=wp.uint32, device=device)
     for entry, first_row in zip(scene.objects, first_rows.numpy().tolist(), strict=True):
-        if entry.source.is_reflector:
+        if scene.is_reflector[entry.index]:
             inputs = [scene.records, entry.index, first_row, gbuffer.view.camera.eye, bits]
             launch.launch(cull_triangles, len(entry.geometry.faces), inputs, device)
     shown = wp.zeros(count, dtype=wp.uint8, device=device)

@@ -179,7 +179,8 @@ def cull_runs(
         put_in_order(lists, lists.start[run], found)
     if found > 0 and shows_out.shape[0] > 0:
         for i in range(begin, end):
-            shows_out[first_rows[rays.source[i]] + pixel_triangle[rays.pixel[i]]] = wp.uint8(1)
+            if rays.source[i] >= 0:
+                shows_out[first_rows[rays.source[i]] + pixel_triangle[rays.pixel[i]]] = wp.uint8(1)
 
 
 @dataclass(frozen=True, eq=False)

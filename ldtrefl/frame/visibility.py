@@ -27,8 +27,10 @@ from ldtrefl.geometry.perspective_raster import (
     perspective_weights,
 )
 from ldtrefl.scene.description import Camera
+from ldtrefl.shading.surface import part_of
 from ldtrefl.world.camera import Band, camera_view, whole_image
 from ldtrefl.world.device_scene import DeviceScene
+from ldtrefl.world.look_records import Looks
 from ldtrefl.world.records import ObjectRecord
 from ldtrefl.world.triangle_numbers import TriangleNumbers, first_triangle_of, has_number, object_of
 
@@ -104,6 +106,7 @@ def resolve_pixels(
     width: int,
     first_row: int,
     run: int,
+    looks: Looks,
     # Out, the reflectors 0 before:
     seen: GBufferView,
 ):
@@ -111,7 +114,7 @@ def resolve_pixels(
     i = run * (first + wp.tid())
     end = wp.min(i + run, keys.shape[0])
     index = int(-1)
-    is_mirror = wp.uint8(0)
+    reflects = int(0)
     while i < end:
         key = keys[i]
         if key == wp.int64(0):
@@ -120,14 +123,17 @@ def resolve_pixels(
             number = number_in(key)
             if not has_number(numbers, index, number):
                 index = object_of(numbers, number)
-                is_mirror = wp.where(wp.max(objects[index].mirror) > 0.0, wp.uint8(1), wp.uint8(0))
+                reflects = objects[index].reflects
             triangle = first_triangle_of(numbers, index, number)
             if numbers.shift > 0:
                 one, pixel = drawn[place_of[index]], pixel_of(i, width, first_row)
                 triangle = of_its_group(one, objects, corners, triangle, 1 << numbers.shift, pixel, key)
             seen.object[i] = index
             seen.triangle[i] = triangle
-            seen.reflector[i] = is_mirror
+            is_mirror = reflects
+            if reflects == 2:
+                is_mirror = looks.records[objects[index].look].materials[part_of(objects, index, triangle)].reflects
+            seen.reflector[i] = wp.where(is_mirror != 0, wp.uint8(1), wp.uint8(0))
         i += 1
 
 
@@ -150,6 +156,7 @@ def resolved(drawing: Drawing, scene: DeviceScene) -> GBuffer:
         camera.width,
         drawing.band.first_row,
         run,
+        scene.looks,
         view,
     ]
     launch.launch(resolve_pixels, -(-pixels // run), inputs, device)

@@ -22,6 +22,7 @@ from ldtrefl.base.checked import (
     Color,
     Direction,
     Flag,
+    Fraction,
     Intensity,
     Number,
     Positive,
@@ -256,6 +257,11 @@ class Reflection:
     max_bounces: Annotated[Whole, Field(ge=1, le=64)] = 4
     least_weight: Annotated[Real, Field(ge=0.0, le=1.0)] = 1.0 / 512.0
     """A ray ends at a mirror if less than this share of what it meets next would still arrive."""
+    threshold: Fraction = 0.05
+    """A surface that reflects less, as seen from where it is looked at, sends no ray: it shows the environment. What an
+    object's ``mirror`` says always sends one."""
+    rough_limit: Fraction = 0.25
+    """A surface that is rougher sends no ray: it shows the environment, blurred."""
 
 
 @refusing_in_one_line

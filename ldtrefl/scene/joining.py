@@ -15,6 +15,9 @@ from ldtrefl.scene.piece import Piece
 BYTES_PER_VERTEX = 160.0
 """A vertex while pieces are joined, welded and smoothed, the mesh itself included; measured."""
 
+BYTES_PER_COLOR = 55.0
+"""What a vertex takes besides if it has a colour, likewise."""
+
 BYTES_PER_TRIANGLE = 90.0
 """A triangle, likewise."""
 
@@ -22,7 +25,8 @@ BYTES_PER_TRIANGLE = 90.0
 def joining_bytes(pieces: list[Piece]) -> float:
     """Bytes that :func:`joined_mesh` takes, an estimate."""
     vertices, triangles = (sum(map(len, of)) for of in ([p.vertices for p in pieces], [p.faces for p in pieces]))
-    return BYTES_PER_VERTEX * vertices + BYTES_PER_TRIANGLE * triangles
+    colored = sum(len(piece.vertices) for piece in pieces if piece.colors is not None)
+    return BYTES_PER_VERTEX * vertices + BYTES_PER_COLOR * colored + BYTES_PER_TRIANGLE * triangles
 
 
 def joined_mesh(pieces: list[Piece]) -> Mesh:

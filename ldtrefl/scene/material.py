@@ -5,10 +5,10 @@ from __future__ import annotations
 import functools
 from typing import Annotated
 
-from pydantic import ValidatorFunctionWrapHandler, WrapValidator
+from pydantic import Field, ValidatorFunctionWrapHandler, WrapValidator
 from pydantic.dataclasses import dataclass
 
-from ldtrefl.base.checked import CONFIG, Color, Flag, Reflectance, Text, refusing_in_one_line
+from ldtrefl.base.checked import CONFIG, Color, Flag, Fraction, Real, Reflectance, Text, refusing_in_one_line
 from ldtrefl.files.picture_reading import stored_picture
 from ldtrefl.files.stored_picture import StoredPicture
 
@@ -46,10 +46,22 @@ class Material:
     """Specular reflectance; any channel above 0 makes the object a reflector."""
     fresnel: Flag = False
     """Schlick's approximation, with ``mirror`` as the reflectance at normal incidence."""
+    metallic: Fraction | None = None
+    """As in glTF: 1 for a metal, which reflects with ``albedo`` at normal incidence, 0 for what is not. With one of
+    these three given, glTF's model holds; the others, if the mesh file does not say them, are 0, 0 and 1.5."""
+    roughness: Fraction | None = None
+    """As in glTF: 0 for a mirror, 1 for matt; beside ``mirror``, that of the mirror."""
+    ior: Annotated[Real, Field(ge=1.0)] | None = None
+    """Index of refraction: says how much reflects at normal incidence of what is no metal."""
 
     def __post_init__(self) -> None:
         if isinstance(self.albedo, _NotGiven):
             object.__setattr__(self, "albedo", _NotGiven((0.0 if any(self.mirror) else 0.8,) * 3))
+
+    @property
+    def has_model(self) -> bool:
+        """Whether it says more than ``albedo``, ``emission`` and a sharp ``mirror``."""
+        return self.metallic is not None or self.roughness is not None or self.ior is not None
 
     @functools.cached_property
     def key(self) -> tuple[object, ...]:
@@ -57,7 +69,7 @@ class Material:
         albedo = self.albedo if is_given(self.albedo) else None
         emission = self.emission if is_given(self.emission) else None
         texture = None if self.picture is None else self.picture.key
-        return albedo, texture, emission, self.mirror, self.fresnel
+        return albedo, texture, emission, self.mirror, self.fresnel, self.metallic, self.roughness, self.ior
 
     @functools.cached_property
     def picture(self) -> StoredPicture | None:

@@ -95,6 +95,11 @@ class SurfaceMaterial:
         return content_key(json.dumps(plain), *textures)
 
     @property
+    def reflects(self) -> bool:
+        """Whether it reflects anything: else it is matt, however rough it is said to be."""
+        return self.metallic > 0.0 or self.specular > 0.0 or self.clearcoat > 0.0
+
+    @property
     def textures(self) -> list[Texture]:
         """All that it has."""
         values = [getattr(self, field.name) for field in dataclasses.fields(self)]

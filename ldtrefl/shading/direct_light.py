@@ -1,7 +1,8 @@
 """Direct light: the radiance that a surface emits, and scatters of what lights send.
 
 Outgoing radiance of a surface: ``emission + albedo * texture * (ambient + sum of lights) + mirror * reflected``. The
-last term is added elsewhere (``frame/composite.py``). Surfaces with a look may get less ambient light (``finish.py``).
+last term is added elsewhere (``frame/composite.py``). Surfaces with a look (``finish.py``) may get less ambient light,
+and mirror lights as microfacets do.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import warp as wp
 
 from ldtrefl.geometry.vectors import from_to
 from ldtrefl.shading.finish import Finish, finish_surface
+from ldtrefl.shading.highlights import highlights
 from ldtrefl.shading.surface import Surface
 from ldtrefl.shading.surfaces import Sighting, color_surface
 from ldtrefl.world.look_records import Looks
@@ -33,8 +35,8 @@ def at_most_largest(radiance: wp.vec3) -> wp.vec3:
 
 
 def make_direct_radiance(is_lit: Callable[..., bool], has_looks: bool) -> Callable[..., wp.vec3]:
-    """``direct_radiance(views, objects, top, lighting, surface, finish)``: emitted and scattered radiance; ``finish``
-    counts only if ``has_looks``.
+    """``direct_radiance(views, objects, top, lighting, surface, finishes)``: emitted and scattered radiance; the
+    first of ``finishes`` counts only if ``has_looks``.
 
     ``is_lit(views, objects, top, surface, direction, distance)`` answers whether light arrives from unit ``direction``,
     from a light at ``distance``; it closes over a tracer, so shadows exist once for all tracers.
@@ -49,11 +51,12 @@ def make_direct_radiance(is_lit: Callable[..., bool], has_looks: bool) -> Callab
         top: TopLevel,
         lighting: LightingRecord,
         surface: Surface,
-        finish: Finish,
+        finishes: wp.array(dtype=Finish),
     ) -> wp.vec3:
         total = lighting.ambient
+        shine = wp.vec3(0.0)
         if with_looks:
-            total = finish.ambient * lighting.ambient
+            total = finishes[0].ambient * lighting.ambient
         for i in range(lighting.lights.shape[0]):
             towards = lighting.lights[i].towards
             radiance = lighting.lights[i].radiance
@@ -64,10 +67,17 @@ def make_direct_radiance(is_lit: Callable[..., bool], has_looks: bool) -> Callab
                 towards = wp.normalize(offset)
                 radiance = at_most_largest(radiance / wp.max(distance * distance, SMALLEST_SQUARE))
             cosine = wp.dot(surface.normal, towards)
+            if with_looks:
+                cosine = wp.dot(finishes[0].normal, towards)
             if cosine > 0.0:
                 if is_lit(views, objects, top, surface, towards, distance):
                     total += cosine * radiance
-        return at_most_largest(surface.emission + wp.cw_mul(surface.albedo, total))
+                    if with_looks:
+                        shine += wp.cw_mul(highlights(finishes, towards), radiance)
+        light = surface.emission + wp.cw_mul(surface.albedo, total)
+        if with_looks:
+            light += shine
+        return at_most_largest(light)
 
     return direct_radiance
 
@@ -92,7 +102,8 @@ def make_shaded(is_lit: Callable[..., bool], has_looks: bool) -> Callable[..., w
         surfaces: wp.array(dtype=Surface),
     ) -> wp.vec3:
         color_surface(objects, sightings, lane, surfaces)
-        return direct_radiance(views, objects, top, lighting, surfaces[lane], Finish())
+        no_finishes = wp.array(ptr=wp.uint64(0), shape=(0,), dtype=Finish)
+        return direct_radiance(views, objects, top, lighting, surfaces[lane], no_finishes)
 
     @wp.func
     def shaded_with_looks(
@@ -105,12 +116,14 @@ def make_shaded(is_lit: Callable[..., bool], has_looks: bool) -> Callable[..., w
         lane: int,
         surfaces: wp.array(dtype=Surface),
     ) -> wp.vec3:
-        finish = Finish()
-        finish.ambient = 1.0
+        memory = wp.zeros(shape=1, dtype=Finish)
+        finishes = wp.array(ptr=memory.ptr, shape=(1,), dtype=Finish)
         if objects[sightings[lane].object].look >= 0:
-            finish = finish_surface(objects, looks, sightings, lane, surfaces)
+            finish_surface(objects, looks, lighting, sightings, lane, surfaces, finishes)
         else:
             color_surface(objects, sightings, lane, surfaces)
-        return direct_radiance(views, objects, top, lighting, surfaces[lane], finish)
+            finishes[0].ambient = 1.0
+            finishes[0].normal = surfaces[lane].normal
+        return direct_radiance(views, objects, top, lighting, surfaces[lane], finishes)
 
     return shaded_with_looks if has_looks else shaded_without_looks

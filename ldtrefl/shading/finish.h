@@ -1,7 +1,14 @@
 // What a look makes of a surface: pictures that are read, normals that are mapped, and how much layers reflect
 // (finish.py, which says where the formulas are from).
 
-struct Finishes : Vectors {
+#if defined(__CUDA_ARCH__)
+#define APART CUDA_CALLABLE static
+#else
+#define APART static __attribute__((noinline))  // compiled once, however often it is called
+#endif
+#define SHARED CUDA_CALLABLE static inline
+
+struct Finishes {
     struct Three { float x, y, z; };
     struct Texel { float x, y, z, w; };
 
@@ -79,7 +86,7 @@ struct Finishes : Vectors {
     }
 
     // A picture's colour and alpha at (u, v): of the nearest texel, or of four, blended.
-    OUT_OF_LINE Texel sample(const Picture& of, float u, float v) {
+    APART Texel sample(const Picture& of, float u, float v) {
         const float s = of.across[0] * u + of.across[1] * v + of.across[2];
         const float t = of.down[0] * u + of.down[1] * v + of.down[2];
         float x = in_texels(s, of.width, of.wrap_u), y = in_texels(t, of.height, of.wrap_v);
@@ -136,5 +143,171 @@ struct Finishes : Vectors {
         tilted = sum(tilted, scaled(scale * (2.0f * map.y - 1.0f), up));
         tilted = sum(tilted, scaled(2.0f * map.z - 1.0f, front));
         return dot(tilted, tilted) > 0.0f ? scaled(side, unit(tilted)) : normal;
+    }
+
+    // The table's entry for a cosine with the way to the viewer and a roughness, blended from four.
+    APART Shares shares_at(const float* table, float cosine, float roughness) {
+        const float x = sqrtf(clamped(cosine, 0.0f, 1.0f)) * (float)(TABLE_COLUMNS - 1);
+        const float y = clamped(roughness, 0.0f, 1.0f) * (float)(TABLE_ROWS - 1);
+        const int column = (int)smaller(x, (float)(TABLE_COLUMNS - 2)), row = (int)smaller(y, (float)(TABLE_ROWS - 2));
+        const float right = x - (float)column, down = y - (float)row;
+        const float* upper = table + 3 * (TABLE_COLUMNS * row + column);
+        const float* lower = upper + 3 * TABLE_COLUMNS;
+        float made[3];
+        for (int i = 0; i < 3; ++i) {
+            const float above = (1.0f - right) * upper[i] + right * upper[3 + i];
+            made[i] = (1.0f - down) * above + down * ((1.0f - right) * lower[i] + right * lower[3 + i]);
+        }
+        if (row == 0) {  // of the smooth surface the closed form is known
+            const float far = 1.0f - clamped(cosine, 0.0f, 1.0f), grazing = far * far * far * far * far;
+            made[0] = (1.0f - down) * (1.0f - grazing) + down * ((1.0f - right) * lower[0] + right * lower[3]);
+            made[1] = (1.0f - down) * grazing + down * ((1.0f - right) * lower[1] + right * lower[4]);
+        }
+        return {made[0], made[1], made[2]};
+    }
+
+    // What microfacets reflect more than once, as a factor on what they reflect once (Turquin 2019, equation 16).
+    SHARED Three again(const Three& low, const Shares& of) {
+        const float lost = 1.0f / larger(of.low + of.high, LEAST_SHARE) - 1.0f;
+        return {1.0f + low.x * lost, 1.0f + low.y * lost, 1.0f + low.z * lost};
+    }
+
+    APART Layer layer_of(const Three& low, const Three& high, const Shares& of) {
+        const Three factor = again(low, of);
+        return {product(low, factor), product(high, factor)};
+    }
+
+    // How much a layer reflects in all.
+    SHARED Three reflected(const Layer& by, const Shares& of) {
+        return sum(scaled(of.low, by.low), scaled(of.high, by.high));
+    }
+
+    // How a surface reflects and scatters, its textures counted in.
+    struct Model {
+        Three base, emission, specular_color, mirror;
+        float metallic, roughness, dielectric, specular, clearcoat, coat_roughness;
+        int has_mirror, has_fresnel, is_unlit;
+        float threshold, rough_limit;  // from which reflectance, and up to which roughness, rays are sent
+    };
+
+    // What it makes of light.
+    struct Layers {
+        Three diffuse, emission, low, high, coat_low, coat_high;
+        Three mirror;            // what rays are sent for
+        Three haze, coat_haze;   // what is reflected of the environment in place of rays
+        float cosine, coat_cosine;  // by which these blur
+        int is_by_coat;          // 1 if rays are mirrored at the varnish
+    };
+
+    SHARED Three grey(float a) { return {a, a, a}; }
+
+    // What the base reflects and scatters: a metal, a dielectric or both, or the mirror that the scene makes of it.
+    APART void lay_base(const Model& model, const Shares& shares, Layers& made) {
+        Layer layer;
+        made.diffuse = model.base;
+        made.emission = model.emission;
+        if (model.is_unlit) {
+            layer = {grey(0.0f), grey(0.0f)};
+            made.emission = model.base;
+            made.diffuse = grey(0.0f);
+        } else if (model.has_mirror) {
+            layer = layer_of(model.mirror, model.has_fresnel ? grey(1.0f) : model.mirror, shares);
+        } else {
+            const Three tinted = scaled(model.dielectric, model.specular_color);
+            const Three low = {smaller(tinted.x, 1.0f), smaller(tinted.y, 1.0f), smaller(tinted.z, 1.0f)};
+            const Layer dielectric = layer_of(scaled(model.specular, low), grey(model.specular), shares);
+            const Layer metal = layer_of(model.base, grey(1.0f), shares);
+            layer.low = mixed(model.metallic, dielectric.low, metal.low);
+            layer.high = mixed(model.metallic, dielectric.high, metal.high);
+            const float scattered = 1.0f - largest(reflected(dielectric, shares));
+            made.diffuse = scaled((1.0f - model.metallic) * scattered, model.base);
+        }
+        made.low = layer.low;
+        made.high = layer.high;
+    }
+
+    // A varnish reflects first, and lets through what is left; how much it reflects.
+    APART float lay_coat(const Model& model, const Shares& shares, Layers& made) {
+        const Layer coat = layer_of(grey(COAT * model.clearcoat), grey(model.clearcoat), shares);
+        const float reflects = reflected(coat, shares).x, left = 1.0f - reflects;
+        made.diffuse = scaled(left, made.diffuse);
+        made.emission = scaled(left, made.emission);
+        made.low = scaled(left, made.low);
+        made.high = scaled(left, made.high);
+        made.coat_low = coat.low;
+        made.coat_high = coat.high;
+        return reflects;
+    }
+
+    // All of it, for cosines of the base's normal and of the varnish's with the way to the viewer. Rays are sent for what
+    // reflects much and sharply; what is left shows the environment.
+    APART void lay(const Model& model, const float* table, float cosine, float coat_cosine, Layers& made) {
+        const Shares shares = shares_at(table, cosine, model.roughness);
+        lay_base(model, shares, made);
+        made.cosine = shares.cosine;
+        float coat = 0.0f;
+        made.coat_low = made.coat_high = grey(0.0f);
+        made.coat_cosine = 1.0f;
+        if (model.clearcoat > 0.0f && !model.is_unlit) {
+            const Shares of_coat = shares_at(table, coat_cosine, model.coat_roughness);
+            made.coat_cosine = of_coat.cosine;
+            coat = lay_coat(model, of_coat, made);
+        }
+        const Three base = reflected({made.low, made.high}, shares);
+        const float most = largest(base);
+        const bool sends =
+            most > 0.0f && model.roughness <= model.rough_limit && (model.has_mirror || most >= model.threshold);
+        const bool coat_sends = coat > 0.0f && model.coat_roughness <= model.rough_limit && coat >= model.threshold;
+        made.mirror = sum(sends ? base : grey(0.0f), grey(coat_sends ? coat : 0.0f));
+        made.haze = sends ? grey(0.0f) : base;
+        made.coat_haze = grey(coat_sends ? 0.0f : coat);
+        made.is_by_coat = coat_sends && (!sends || coat > most);
+    }
+
+    // An environment of two colours, or of a picture in longitude and latitude and its rough ones.
+    struct Environment {
+        Three up, sky, ground;
+        Picture sharp;  // of no width without one
+        const float* rough;
+        int levels, rows, columns;
+    };
+
+    // Where such a picture has a unit direction, as environment.py has it.
+    SHARED void place_in_picture(const Environment& of, const Three& direction, float height, float& u, float& v) {
+        const float x_of_up = of.up.x < 0.0f ? -of.up.x : of.up.x;
+        const Three reference = x_of_up > NEAR_X ? Three{0.0f, 1.0f, 0.0f} : Three{1.0f, 0.0f, 0.0f};
+        const Three ahead = unit(minus(reference, scaled(dot(reference, of.up), of.up)));
+        u = 0.5f - atan2f(dot(direction, cross(of.up, ahead)), dot(direction, ahead)) * (0.5f / PI);
+        v = acosf(clamped(height, -1.0f, 1.0f)) * (1.0f / PI);
+    }
+
+    // What a rough surface shows about a mirrored unit direction, as a mean. Of two colours the mean cosine by which it
+    // blurs says all; of pictures two are blended.
+    APART Three hazy(const Environment& of, const Three& direction, float roughness, float cosine) {
+        const float height = dot(direction, of.up);
+        if (of.sharp.width == 0) return mixed(0.5f + 0.5f * cosine * height, of.ground, of.sky);
+        float u, v;
+        place_in_picture(of, direction, height, u, v);
+        const float at = roughness * (float)of.levels;
+        const int level = at < (float)of.levels ? (int)at : of.levels - 1;
+        Three total = {0.0f, 0.0f, 0.0f};
+        for (int side = 0; side < 2; ++side) {
+            Picture one = of.sharp;
+            if (level + side > 0) {
+                one.width = of.columns;
+                one.height = of.rows;
+                one.stored = LINEAR_FLOATS;
+                one.floats = of.rough + 3LL * of.rows * of.columns * (level + side - 1);
+            }
+            const Texel found = sample(one, u, v);
+            total = sum(total, scaled(side ? at - (float)level : 1.0f - (at - (float)level), {found.x, found.y, found.z}));
+        }
+        return total;
+    }
+
+    // The direction in which a normal mirrors a ray along ``view``, not below the facet.
+    SHARED Three mirrored(const Three& view, const Three& normal, const Three& facet) {
+        const Three leaving = minus(view, scaled(2.0f * dot(view, normal), normal));
+        return unit(sum(leaving, scaled(larger(-dot(leaving, facet), 0.0f), facet)));
     }
 };

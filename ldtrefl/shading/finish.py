@@ -6,14 +6,19 @@ side would show the inside of what is meant to be solid through any hole, and ra
 
 from __future__ import annotations
 
+import math
+
 import warp as wp
 
 from ldtrefl.device.native_sources import native_body
+from ldtrefl.shading.environment import NEAR_X
 from ldtrefl.shading.surface import Surface, part_of
 from ldtrefl.shading.surfaces import Sighting
 from ldtrefl.world import look_records
 from ldtrefl.world.look_records import Looks
-from ldtrefl.world.records import ObjectRecord
+from ldtrefl.world.records import LightingRecord, ObjectRecord
+from ldtrefl.world.reflectance_table import COLUMNS as TABLE_COLUMNS
+from ldtrefl.world.reflectance_table import ROWS as TABLE_ROWS
 
 LEAST_TILT = 0.01
 """The least cosine of a mapped normal with the facet's, and with the way to the viewer."""
@@ -25,21 +30,56 @@ BYTE = 1.0 / 255.0
 """What the smallest step of a byte is worth."""
 
 
+LEAST_SHARE = 1.0e-3
+"""The least share that microfacets are taken to reflect in all, which is divided by."""
+
+LEAST_ROUGHNESS = 0.05
+"""Lights are mirrored as if surfaces were at least as rough: the highlight of a point, or of a single direction, would
+be infinitely bright on a smooth one. This is 0.3 degrees wide, and up to 50,000 times as bright as a white surface."""
+
+COAT = 0.04
+"""Reflectance of a varnish at normal incidence: its index of refraction is 1.5 (KHR_materials_clearcoat)."""
+
+
 @wp.struct
 class Finish:
-    """What shading needs of a surface with a look, beside ``Surface``."""
+    """What shading needs of a surface with a look, beside ``Surface``. Its layers are the base, and a varnish over it;
+    what they reflect is after what the varnish takes away, and with multiple scattering."""
 
     ambient: float  # share of the ambient light that arrives
+    highlights: int  # layers that mirror lights: 0, the base, or both
+    normal: wp.vec3  # shading normal of the base
+    coat_normal: wp.vec3  # and of the varnish, which normal maps do not bend
+    view: wp.vec3  # unit, from the eye
+    low: wp.vec3  # reflectance of the base at normal incidence,
+    high: wp.vec3  # and along the surface
+    alpha: float  # roughness of its highlights, squared
+    coat_low: wp.vec3
+    coat_high: wp.vec3
+    coat_alpha: float
 
+
+LOOK_CONSTANTS = (
+    *("REPEAT", "CLAMP", "MIRROR", "LINEAR_FLOATS", "SRGB_BYTES"),
+    *("SLOTS", "BASE", "METALLIC_ROUGHNESS", "NORMAL", "OCCLUSION", "EMISSION"),
+    *("SPECULAR", "SPECULAR_COLOR", "CLEARCOAT", "CLEARCOAT_ROUGHNESS"),
+)
+"""Constants of ``look_records.py`` that the C++ uses."""
 
 CONSTANTS: dict[str, float | int] = {
     "LEAST_TILT": LEAST_TILT,
     "FARTHEST": FARTHEST,
     "BYTE": BYTE,
-    **{name: getattr(look_records, name) for name in ("CLAMP", "MIRROR", "LINEAR_FLOATS", "SRGB_BYTES", "SLOTS")},
-    **{name: getattr(look_records, name) for name in ("BASE", "NORMAL", "OCCLUSION", "EMISSION")},
+    "LEAST_SHARE": LEAST_SHARE,
+    "LEAST_ROUGHNESS": LEAST_ROUGHNESS,
+    "COAT": COAT,
+    "NEAR_X": float(NEAR_X),
+    "PI": math.pi,
+    "TABLE_ROWS": TABLE_ROWS,
+    "TABLE_COLUMNS": TABLE_COLUMNS,
+    **{name: getattr(look_records, name) for name in LOOK_CONSTANTS},
 }
-FILES = ("device/vectors.h", "shading/finish.h")
+FILES = ("shading/finish.h",)
 
 READ = """
 using Three = Finishes::Three;
@@ -103,7 +143,8 @@ if (look.colors.shape[0])
 """
 BEND = """
 // Let the normal map bend the normal.
-Three normal = three(surface.normal);
+const Three smooth = three(surface.normal);
+Three normal = smooth;
 if (material.slots > NORMAL && material.textures[NORMAL] >= 0) {
     Three right = {0.0f, 0.0f, 0.0f};
     float sign = 0.0f;
@@ -134,21 +175,90 @@ if (material.slots > NORMAL && material.textures[NORMAL] >= 0) {
     normal = Finishes::on_facets_side(normal, three(surface.facet), Finishes::scaled(-1.0f, three(sighting.view)));
 }
 """
+LAY = """
+// Lay the surface's layers.
+Finishes::Model model;
+model.base = base;
+model.emission = Finishes::product(three(material.emission), color_of(texels[EMISSION]));
+model.specular_color = Finishes::product(three(material.specular_color), color_of(texels[SPECULAR_COLOR]));
+model.mirror = three(material.mirror);
+model.metallic = Finishes::clamped(material.metallic * texels[METALLIC_ROUGHNESS].z, 0.0f, 1.0f);
+model.roughness = Finishes::clamped(material.roughness * texels[METALLIC_ROUGHNESS].y, 0.0f, 1.0f);
+model.dielectric = material.dielectric;
+model.specular = material.specular * texels[SPECULAR].w;
+model.clearcoat = material.clearcoat * texels[CLEARCOAT].x;
+model.coat_roughness = Finishes::clamped(material.clearcoat_roughness * texels[CLEARCOAT_ROUGHNESS].y, 0.0f, 1.0f);
+model.has_mirror = material.has_mirror;
+model.has_fresnel = material.has_fresnel;
+model.is_unlit = material.is_unlit;
+model.threshold = looks.threshold;
+model.rough_limit = looks.rough_limit;
+const Three view = three(sighting.view);
+Finishes::Layers layers;
+Finishes::lay(
+    model, (const float*)looks.shares.data, -Finishes::dot(normal, view), -Finishes::dot(smooth, view), layers
+);
+"""
+HAZE = """
+// Add what is reflected of the environment in place of rays.
+Finishes::Environment around;
+around.up = three(lighting.up);
+around.sky = three(lighting.sky);
+around.ground = three(lighting.ground);
+around.sharp.width = lighting.image_size[1];
+around.sharp.height = lighting.image_size[0];
+around.sharp.stored = lighting.image_bytes.shape[0] > 0 ? SRGB_BYTES : LINEAR_FLOATS;
+around.sharp.wrap_u = REPEAT;
+around.sharp.wrap_v = CLAMP;
+around.sharp.is_nearest = 0;
+for (int i = 0; i < 3; ++i) {
+    around.sharp.across[i] = i == 0;
+    around.sharp.down[i] = i == 1;
+}
+around.sharp.floats = (const float*)lighting.image.data;
+around.sharp.bytes = (const unsigned char*)lighting.image_bytes.data;
+around.sharp.alpha = nullptr;
+around.sharp.decoded = looks.decoded.data;
+around.rough = (const float*)looks.environment.data;
+around.levels = looks.environment.shape[0];
+around.rows = looks.environment.shape[1];
+around.columns = looks.environment.shape[2];
+for (int coat = 0; coat < 2; ++coat) {
+    const Three share = coat ? layers.coat_haze : layers.haze;
+    if (!(Finishes::largest(share) > 0.0f)) continue;
+    const Three leaving = Finishes::mirrored(view, coat ? smooth : normal, three(surface.facet));
+    const float roughness = coat ? model.coat_roughness : model.roughness;
+    const Three light = Finishes::hazy(around, leaving, roughness, coat ? layers.coat_cosine : layers.cosine);
+    layers.emission = Finishes::sum(layers.emission, Finishes::product(share, light));
+}
+"""
 STORE = """
 auto& finish = finishes.data[0];
 finish.ambient = 1.0f + material.occlusion_strength * (texels[OCCLUSION].x - 1.0f);
-surface.normal = vec3(normal);
-surface.albedo = vec3(material.is_unlit ? Three{0.0f, 0.0f, 0.0f} : base);
-surface.emission = vec3(
-    material.is_unlit ? base : Finishes::product(three(material.emission), color_of(texels[EMISSION]))
-);
+finish.normal = vec3(normal);
+finish.coat_normal = vec3(smooth);
+finish.view = sighting.view;
+finish.low = material.has_highlights ? vec3(layers.low) : wp::vec3(0.0f);
+finish.high = material.has_highlights ? vec3(layers.high) : wp::vec3(0.0f);
+finish.coat_low = vec3(layers.coat_low);
+finish.coat_high = vec3(layers.coat_high);
+finish.highlights = model.clearcoat > 0.0f ? 2 : material.has_highlights && Finishes::largest(layers.high) > 0.0f;
+const float alpha = Finishes::larger(model.roughness, LEAST_ROUGHNESS);
+const float coat_alpha = Finishes::larger(model.coat_roughness, LEAST_ROUGHNESS);
+finish.alpha = alpha * alpha;
+finish.coat_alpha = coat_alpha * coat_alpha;
+surface.normal = vec3(layers.is_by_coat ? smooth : normal);
+surface.albedo = vec3(layers.diffuse);
+surface.emission = vec3(layers.emission);
+surface.mirror = vec3(layers.mirror);
 """
 
 
-@wp.func_native(native_body(CONSTANTS, FILES, READ + BEND + STORE))
+@wp.func_native(native_body(CONSTANTS, FILES, READ + BEND + LAY + HAZE + STORE))
 def finish_part(
     objects: wp.array(dtype=ObjectRecord),
     looks: Looks,
+    lighting: LightingRecord,
     part: int,
     sightings: wp.array(dtype=Sighting),
     lane: int,
@@ -163,13 +273,14 @@ def finish_part(
 def finish_surface(
     objects: wp.array(dtype=ObjectRecord),
     looks: Looks,
+    lighting: LightingRecord,
     sightings: wp.array(dtype=Sighting),
     lane: int,
     surfaces: wp.array(dtype=Surface),
-) -> Finish:
-    """Set the colours and the normal of a lane's surface that has a look; what else shading needs of it."""
-    memory = wp.zeros(shape=1, dtype=Finish)
-    finishes = wp.array(ptr=memory.ptr, shape=(1,), dtype=Finish)
+    finishes: wp.array(dtype=Finish),
+):
+    """Set the colours, the reflectance and the normal of a lane's surface that has a look; and the first finish, which
+    is what else shading needs of it. The surface's normal is then that which rays are mirrored at; what it shows of the
+    environment in place of rays is added to its emission."""
     part = part_of(objects, sightings[lane].object, sightings[lane].triangle)
-    finish_part(objects, looks, part, sightings, lane, surfaces, finishes)
-    return finishes[0]
+    finish_part(objects, looks, lighting, part, sightings, lane, surfaces, finishes)

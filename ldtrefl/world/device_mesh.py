@@ -9,12 +9,12 @@ import warp as wp
 
 from ldtrefl.device import warp_abi
 from ldtrefl.files.stored_picture import StoredPicture
+from ldtrefl.scene.description import Reflection
 from ldtrefl.scene.material import Material
 from ldtrefl.scene.mesh import Mesh
 from ldtrefl.world.appearance import Appearance, appearance_of
 from ldtrefl.world.clusters import Clusters, clustered
-from ldtrefl.world.look_records import LookRecord
-from ldtrefl.world.looks import has_material, look_of, mesh_needs_look
+from ldtrefl.world.looks import Look, has_material, look_of, mesh_needs_look
 from ldtrefl.world.outliers import Outliers, outliers_of
 
 
@@ -30,8 +30,8 @@ class DeviceMesh:
         """Bytes of the normals and texture coordinates that have been uploaded."""
         self._appearances: dict[str | None, Appearance] = {}
         """By key of the texture."""
-        self._looks: dict[object, LookRecord] = {}
-        """By what the scene says of an object."""
+        self._looks: dict[object, Look] = {}
+        """By what the scene says of an object, and of reflections."""
 
     @functools.cached_property
     def reach(self) -> float:
@@ -88,11 +88,13 @@ class DeviceMesh:
         """Whether the mesh's file says more of its surface than colours and plain pictures."""
         return mesh_needs_look(self.mesh)
 
-    def look(self, material: Material) -> LookRecord:
+    def look(self, material: Material, reflection: Reflection) -> Look:
         """The look of an object with this mesh. Objects of which the scene says the same share one."""
-        if material.key not in self._looks:
-            self._looks[material.key] = look_of(self.mesh, material, self._look_arrays, self.vertices.device)
-        return self._looks[material.key]
+        key = (material.key, reflection.threshold, reflection.rough_limit)
+        if key not in self._looks:
+            arrays, device = self._look_arrays, self.vertices.device
+            self._looks[key] = look_of(self.mesh, material, reflection, arrays, device)
+        return self._looks[key]
 
     @functools.cached_property
     def _look_arrays(self) -> dict[str, wp.array]:

@@ -57,7 +57,9 @@ class DeviceScene:
         self._top_order: np.ndarray | None = None if before is None else before._top_order
         decoded = wp.array(linear_of_bytes(), dtype=float, device=device, copy=False)
         self._decoded: wp.array = decoded if before is None else before._decoded  # records that are taken over read it
-        self._looks: SceneLooks = SceneLooks(self._decoded, device) if before is None else before._looks
+        self._looks: SceneLooks = (
+            before._looks if before is not None else SceneLooks(scene.reflection, self._decoded, device)
+        )
         self.device_from_world = device_space(scene.layout_box)
         if before is not None and before.scene.layout.has_meshes_of(scene.layout):
             self._take_over(before)
@@ -68,7 +70,7 @@ class DeviceScene:
         self.lighting: LightingRecord = lighting_of(
             scene, self.device_from_world, self._decoded, device, lighting_before
         )
-        self.looks: Looks = self._looks.struct
+        self.looks: Looks = self._looks.struct(scene.environment_image)
         self.look_from(scene.camera)
 
     def _place_all(self, before: DeviceScene | None) -> None:
@@ -176,12 +178,12 @@ class DeviceScene:
 
     @functools.cached_property
     def is_reflector(self) -> np.ndarray:
-        """(objects,) bool."""
-        return self._records["mirror"].max(axis=1, initial=0.0) > 0.0
+        """(objects,) bool: from which rays may be sent."""
+        return np.asarray(self._records["reflects"] > 0)
 
     @property
     def reflectors(self) -> list[DeviceObject]:
-        """The objects that mirror."""
+        """The objects that may send rays."""
         return [self.objects[number] for number in np.flatnonzero(self.is_reflector).tolist()]
 
     @functools.cached_property

@@ -63,6 +63,18 @@ class MaterialRecord:
     alpha_cutoff: float
     emission: wp.vec3
     is_unlit: int
+    metallic: float
+    roughness: float
+    dielectric: float  # reflectance of the dielectric at normal incidence, by its index of refraction
+    specular: float  # times that, and how much it reflects along the surface
+    specular_color: wp.vec3  # times the former
+    clearcoat: float
+    clearcoat_roughness: float
+    mirror: wp.vec3  # reflectance that the scene gives in place of the model's, where it gives one
+    has_mirror: int
+    has_fresnel: int  # of the mirror
+    has_highlights: int  # whether lights are mirrored, too
+    reflects: int  # whether a ray may be sent from some place of it
     normal_scale: float
     occlusion_strength: float
     slots: int  # texture slots that are looked at: up to the last one with a texture
@@ -90,3 +102,7 @@ class Looks:
 
     records: wp.array(dtype=LookRecord)
     decoded: wp.array(dtype=float)  # the linear value of every byte of sRGB
+    shares: wp.array(dtype=wp.vec3)  # how much rough surfaces reflect (``reflectance_table.py``)
+    environment: wp.array3d(dtype=wp.vec3)  # its picture, rougher and rougher (``rough_environment.py``); or empty
+    threshold: float  # reflectance from which on a ray is sent
+    rough_limit: float  # roughness up to which one is

@@ -2,18 +2,23 @@
 
 A key that ``[object.material]`` gives overrides the file's for all parts; one that it does not give leaves the file's.
 ``albedo`` is times the file's base colour. Where it is not given it counts as 1 for materials of a file, and as 0.8 for
-things without any.
+things without any. ``mirror`` takes the place of all that the file says of reflection; ``metallic``, ``roughness`` and
+``ior`` make of a matt material one of glTF's model, as smooth as can be if nothing says how rough it is.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
 import warp as wp
 
 from ldtrefl.base.errors import InputError
+from ldtrefl.files.srgb import srgb_from_linear
+from ldtrefl.files.stored_picture import StoredPicture
+from ldtrefl.scene.description import Reflection
 from ldtrefl.scene.material import Material, is_given
 from ldtrefl.scene.mesh import Mesh
 from ldtrefl.scene.surface_material import PLAIN, SurfaceMaterial, Texture
@@ -25,13 +30,18 @@ MODES = {"opaque": look_records.OPAQUE, "mask": look_records.MASK, "blend": look
 
 SLOT_FIELDS = {
     "base_texture": look_records.BASE,
+    "metallic_roughness_texture": look_records.METALLIC_ROUGHNESS,
     "normal_texture": look_records.NORMAL,
     "occlusion_texture": look_records.OCCLUSION,
     "emission_texture": look_records.EMISSION,
+    "specular_texture": look_records.SPECULAR,
+    "specular_color_texture": look_records.SPECULAR_COLOR,
+    "clearcoat_texture": look_records.CLEARCOAT,
+    "clearcoat_roughness_texture": look_records.CLEARCOAT_ROUGHNESS,
 }
 """Textures of a material, and their slots."""
 
-ONLY_COLORS = ("name", "base_color", "base_texture", "double_sided", "alpha", "alpha_cutoff", "ior")
+ONLY_COLORS = ("name", "base_color", "base_texture", "double_sided", "alpha", "alpha_cutoff", "ior", "roughness")
 """Fields that say nothing more of a matt, opaque material than ``ObjectRecord`` does."""
 
 
@@ -58,17 +68,30 @@ def _is_laid_out(texture: Texture) -> bool:
     return texture.key != Texture(texture.picture).key
 
 
+@dataclass(frozen=True, eq=False)
+class Look:
+    """What an object looks like, on a device."""
+
+    record: LookRecord
+    reflects: bool
+    """Whether rays may be sent from some part of it."""
+    shines: bool
+    """Whether some part reflects anything at all."""
+
+
 def look_of(
     mesh: Mesh,
     own: Material,
+    reflection: Reflection,
     arrays: dict[str, wp.array],
     device: wp.Device,
-) -> LookRecord:
+) -> Look:
     """The look of an object.
 
     Args:
         mesh: its mesh.
         own: what the scene says of it.
+        reflection: from when on rays are sent.
         arrays: those of the mesh's vertices, by the names of the fields.
         device: where it is read.
 
@@ -80,12 +103,13 @@ def look_of(
     look, pool, is_of_file = LookRecord(), TexturePool(), has_material(mesh)
     looks = [overridden(part.material, own, is_of_file=is_of_file) for part in mesh.parts]
     uv_sets = [mesh.uvs is not None, mesh.second_uvs is not None]
-    records = [_material_record(material, pool, uv_sets) for material in looks]
+    records = [_material_record(material, own, reflection, pool, uv_sets) for material in looks]
     look.materials = wp.array(records, dtype=MaterialRecord, device=device)
     pool.upload(look, device)
     for name, array in arrays.items():
         setattr(look, name, array)
-    return look
+    shines = any(record.has_mirror or material.reflects for record, material in zip(records, looks, strict=True))
+    return Look(look, any(record.reflects for record in records), shines)
 
 
 def overridden(material: SurfaceMaterial, own: Material, *, is_of_file: bool) -> SurfaceMaterial:
@@ -98,12 +122,42 @@ def overridden(material: SurfaceMaterial, own: Material, *, is_of_file: bool) ->
         changes["base_texture"] = Texture(own.picture)
     if is_given(own.emission):
         changes["emission"], changes["emission_texture"] = own.emission, None
+    if own.metallic is not None:
+        changes["metallic"] = own.metallic
+    if own.ior is not None:
+        changes["ior"] = own.ior
+    if own.metallic is not None or own.roughness is not None or any(own.mirror):
+        changes["metallic_roughness_texture"] = _kept_texture(material, own)
+    if own.roughness is not None:
+        changes["roughness"] = own.roughness
+    elif any(own.mirror) or (own.has_model and not material.reflects):
+        changes["roughness"] = 0.0
+    if own.has_model and not material.reflects:
+        changes["specular"] = 1.0
     return replace(material, **changes)
 
 
-def _material_record(material: SurfaceMaterial, pool: TexturePool, uv_sets: Sequence[bool]) -> MaterialRecord:
+def _kept_texture(material: SurfaceMaterial, own: Material) -> Texture | None:
+    """The texture of roughness and metallic without what is given in its place."""
+    texture = material.metallic_roughness_texture
+    rough_is_given, metal_is_given = own.roughness is not None or any(own.mirror), own.metallic is not None
+    if texture is None or (rough_is_given and metal_is_given):
+        return None
+    pixels = np.array(texture.picture.pixels)
+    white = 255 if pixels.dtype == np.uint8 else 1.0
+    if rough_is_given:
+        pixels[..., 1] = white
+    if metal_is_given:
+        pixels[..., 2] = white
+    return replace(texture, picture=StoredPicture(pixels))
+
+
+def _material_record(
+    material: SurfaceMaterial, own: Material, reflection: Reflection, pool: TexturePool, uv_sets: Sequence[bool]
+) -> MaterialRecord:
     """A material as kernels read it; a texture without its texture coordinates is left out."""
     record = MaterialRecord()
+    _set_model(record, material, own)
     record.base, record.alpha = wp.vec3(*material.base_color), material.alpha
     record.alpha_mode, record.alpha_cutoff = MODES[material.alpha_mode], material.alpha_cutoff
     record.emission, record.is_unlit = wp.vec3(*material.emission), int(material.is_unlit)
@@ -114,5 +168,46 @@ def _material_record(material: SurfaceMaterial, pool: TexturePool, uv_sets: Sequ
         if texture is not None and texture.uv_set < len(uv_sets) and uv_sets[texture.uv_set]:
             numbers[slot] = pool.number_of(texture)
     record.textures = SlotNumbers(*numbers)
+    record.reflects = int(not material.is_unlit and _may_send_rays(material, own, reflection))
     record.slots = max((slot + 1 for slot, number in enumerate(numbers) if number >= 0), default=0)
     return record
+
+
+def _set_model(record: MaterialRecord, material: SurfaceMaterial, own: Material) -> None:
+    """Set how a surface reflects."""
+    record.metallic, record.roughness = material.metallic, material.roughness
+    record.dielectric = 1.0 if material.ior == 0.0 else ((material.ior - 1.0) / (material.ior + 1.0)) ** 2
+    record.specular, record.specular_color = material.specular, wp.vec3(*material.specular_color)
+    record.clearcoat, record.clearcoat_roughness = material.clearcoat, material.clearcoat_roughness
+    record.mirror, record.has_mirror = wp.vec3(*own.mirror), int(any(own.mirror))
+    record.has_fresnel = int(own.fresnel)
+    # A sharp mirror of the scene mirrors no lights, with a look or without.
+    record.has_highlights = int(not any(own.mirror) or own.roughness is not None)
+
+
+def _may_send_rays(material: SurfaceMaterial, own: Material, reflection: Reflection) -> bool:
+    """Whether some place of a material may reflect enough, and sharply enough, for a ray. Along the surface it reflects
+    as much as it ever does."""
+    least_rough = material.roughness * _extremes(material.metallic_roughness_texture, 1)[0]
+    most = 1.0 if any(own.mirror) else material.metallic * _extremes(material.metallic_roughness_texture, 2)[1]
+    most = max(most, material.specular * _most_alpha(material.specular_texture))
+    sends = most > 0.0 and most >= reflection.threshold and least_rough <= reflection.rough_limit
+    coat = material.clearcoat * _extremes(material.clearcoat_texture, 0)[1]
+    coat_rough = material.clearcoat_roughness * _extremes(material.clearcoat_roughness_texture, 1)[0]
+    coat_sends = coat > 0.0 and coat >= reflection.threshold and coat_rough <= reflection.rough_limit
+    return sends or coat_sends
+
+
+def _extremes(texture: Texture | None, channel: int) -> tuple[float, float]:
+    """The least and the largest fraction in a channel of a texture of data; 1 without one."""
+    if texture is None:
+        return 1.0, 1.0
+    pixels = texture.picture.pixels[..., channel]
+    ends = np.array([pixels.min(), pixels.max()])
+    low, high = ends / 255.0 if pixels.dtype == np.uint8 else srgb_from_linear(ends)
+    return float(low), float(high)
+
+
+def _most_alpha(texture: Texture | None) -> float:
+    """The largest alpha of a texture; 1 without any."""
+    return 1.0 if texture is None or texture.picture.alpha is None else float(texture.picture.alpha.max()) / 255.0

@@ -67,7 +67,9 @@ def fill_records(
     records["look"] = look_of
     records["smooth"], records["fresnel"] = smooth, [material.fresnel for material in materials]
     records["albedo"], records["mirror"], records["emission"] = albedo, mirror, emission
-    records["returns"] = _sides_with_returns(meshes, mesh_of, mirror.max(axis=1, initial=0.0) > 0.0)
+    is_mirror = (mirror.max(axis=1, initial=0.0) > 0.0) & (look_of < 0)
+    records["reflects"] = np.where(looks.reflect(look_of), 2, is_mirror)
+    records["returns"] = _sides_with_returns(meshes, mesh_of, records["reflects"] > 0)
 
 
 def fill_places(records: np.ndarray, device_from_unit: np.ndarray, radii: np.ndarray) -> None:

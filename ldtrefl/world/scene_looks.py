@@ -3,25 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from operator import attrgetter
 
 import numpy as np
 import warp as wp
 
+from ldtrefl.files.stored_picture import StoredPicture
+from ldtrefl.scene.description import Reflection
 from ldtrefl.scene.material import Material
 from ldtrefl.world.device_mesh import DeviceMesh
 from ldtrefl.world.look_records import LookRecord, Looks
+from ldtrefl.world.looks import Look
+from ldtrefl.world.reflectance_table import reflectance_table
+from ldtrefl.world.rough_environment import rough_environment
 
 
 class SceneLooks:
     """The looks of objects by mesh and material."""
 
-    def __init__(self, decoded: wp.array, device: wp.Device) -> None:
+    def __init__(self, reflection: Reflection, decoded: wp.array, device: wp.Device) -> None:
         self.device = device
+        self._reflection = reflection
+        self._decoded = decoded
         self._numbers: dict[tuple[DeviceMesh, object], int] = {}
-        self._records: list[LookRecord] = []
-        self._struct = Looks()
-        self._struct.records = wp.empty(0, dtype=LookRecord, device=device)
-        self._struct.decoded = decoded
+        self._looks: list[Look] = []
+        self._struct: tuple[int, StoredPicture | None, Looks] | None = None
+        """The number of looks and the environment's picture that it was made for, and what was made."""
 
     def numbers_of(
         self, materials: Sequence[Material], meshes: Sequence[DeviceMesh], mesh_of: np.ndarray
@@ -34,8 +41,8 @@ class SceneLooks:
             mesh_of: (n,) the number of each object's mesh.
         """
         numbers = np.full(len(materials), -1, np.int64)
-        of_mesh = np.array([mesh.needs_look for mesh in meshes], bool)
-        needs = of_mesh[mesh_of]
+        needs = np.array([mesh.needs_look for mesh in meshes], bool)[mesh_of]
+        needs |= np.fromiter(map(attrgetter("has_model"), materials), bool, len(materials))
         for index in np.flatnonzero(needs).tolist():
             numbers[index] = self._number_of(meshes[mesh_of[index]], materials[index])
         return numbers
@@ -43,16 +50,31 @@ class SceneLooks:
     def _number_of(self, mesh: DeviceMesh, material: Material) -> int:
         key = (mesh, material.key)
         if key not in self._numbers:
-            self._records.append(mesh.look(material))
-            self._numbers[key] = len(self._records) - 1
+            self._looks.append(mesh.look(material, self._reflection))
+            self._numbers[key] = len(self._looks) - 1
         return self._numbers[key]
 
-    @property
-    def struct(self) -> Looks:
-        """All looks as kernels read them. An earlier answer stays as it was."""
-        if self._struct.records.shape[0] != len(self._records):
-            made = Looks()
-            made.records = wp.array(self._records, dtype=LookRecord, device=self.device)
-            made.decoded = self._struct.decoded
-            self._struct = made
-        return self._struct
+    def reflect(self, numbers: np.ndarray) -> np.ndarray:
+        """(n,) bool: whether rays may be sent from looks of these numbers; False for -1."""
+        of_look = np.array([*(look.reflects for look in self._looks), False], bool)
+        return of_look[numbers]
+
+    def struct(self, environment: StoredPicture | None) -> Looks:
+        """All looks as kernels read them, in an environment. An earlier answer stays as it was."""
+        before = self._struct
+        if before is not None and before[0] == len(self._looks) and before[1] is environment:
+            return before[2]
+        made, device = Looks(), self.device
+        made.records = wp.empty(0, dtype=LookRecord, device=device)
+        shares, rough = np.zeros((0, 3), np.float32), np.zeros((0, 0, 0, 3), np.float32)
+        if self._looks:
+            made.records = wp.array([look.record for look in self._looks], dtype=LookRecord, device=device)
+            shares = reflectance_table()
+        if environment is not None and any(look.shines for look in self._looks):
+            rough = rough_environment(environment)
+        made.shares = wp.array(shares, dtype=wp.vec3, device=device, copy=False)
+        made.environment = wp.array(rough, dtype=wp.vec3, device=device, copy=False)
+        made.decoded = self._decoded
+        made.threshold, made.rough_limit = self._reflection.threshold, self._reflection.rough_limit
+        self._struct = len(self._looks), environment, made
+        return made

@@ -6,8 +6,25 @@ from dataclasses import replace
 
 import numpy as np
 
+from ldtrefl.base import budget
 from ldtrefl.scene.piece import Piece
 from ldtrefl.scene.welding import first_of_equals
+
+CUTTING_BYTES = 250.0
+"""What a triangle takes while faces are checked and cut; measured."""
+
+SPLITTING_BYTES = 40.0
+"""What a corner takes while corners are compared, besides twice its values; measured."""
+
+
+def take_for_triangles(sizes: np.ndarray) -> None:
+    """Ask for the memory to cut faces of so many corners.
+
+    Raises:
+        InputError: it is more than is allowed.
+    """
+    count = int(np.maximum(sizes.astype(np.int64) - 2, 0).sum())
+    budget.take(CUTTING_BYTES * count, f"{count} triangles")
 
 
 def split_corners(faces: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -19,7 +36,11 @@ def split_corners(faces: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np
 
     Returns:
         (n,) numbers of corners, one for each new vertex, in the order of the file, and (m, 3) faces of those.
+
+    Raises:
+        InputError: it takes more memory than is allowed.
     """
+    budget.take((SPLITTING_BYTES + 16.0 * (values.shape[1] + 1)) * faces.size, f"{faces.size} corners of faces")
     firsts = first_of_equals(np.column_stack([faces.reshape(-1), values]).astype(np.float64))
     if firsts is None:
         every = np.arange(faces.size)

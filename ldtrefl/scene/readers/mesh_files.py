@@ -81,9 +81,8 @@ def _load_mesh(path: str, _modified: int, _size: int) -> Mesh:
     # What NumPy would warn of ends in a check of the mesh.
     with budget.account(), np.errstate(all="ignore"):
         try:
-            pieces, taken = _read_pieces(path)
-            # What was taken to read the file is free again.
-            budget.take(max(0.0, joining_bytes(pieces) - taken), "its mesh")
+            pieces = _read_pieces(path)
+            budget.take(joining_bytes(pieces), "its mesh")
             return joined_mesh(pieces)
         except InputError as error:
             raise error.within(path) from None
@@ -91,22 +90,17 @@ def _load_mesh(path: str, _modified: int, _size: int) -> Mesh:
             raise InputError(f"{path}: not a mesh that can be read ({type(error).__name__}: {error})") from error
 
 
-def _read_pieces(path: str) -> tuple[list[Piece], float]:
-    """(the pieces of all mesh files in a file, the bytes that were taken from the budget to read them)."""
+def _read_pieces(path: str) -> list[Piece]:
+    """The pieces of all mesh files in a file."""
     pieces: list[Piece] = []
-    taken = 0.0
     for data, kind, beside in mesh_files(path):
-        if kind not in GLTF:
-            needed = reading_bytes(data, kind)
-            budget.take(needed, f"reading it as {kind}")
-            taken += needed
         found, not_shown = _read(data, kind, beside)
         pieces += found
         for line in dict.fromkeys(not_shown):
             _log.warning("%s: not shown: %s", path, printable(line))
     if not pieces:
         raise InputError("the mesh has no triangles")
-    return pieces, taken
+    return pieces
 
 
 def _read(data: bytes, kind: str, beside: Resolver) -> tuple[list[Piece], list[str]]:
@@ -124,6 +118,8 @@ def _read(data: bytes, kind: str, beside: Resolver) -> tuple[list[Piece], list[s
 
 def _read_by_trimesh(data: bytes, kind: str, beside: Resolver) -> tuple[list[Piece], list[str]]:
     """The same of kinds without a reader of our own."""
+    with budget.given_back():
+        budget.take(reading_bytes(data, kind), f"reading it as {kind}")
     with trimesh_warnings() as warnings:
         pieces, not_shown = pieces_by_trimesh(data, kind, beside)
     if warnings and kind.startswith("stl"):

@@ -11,10 +11,11 @@ from typing import Any
 
 import numpy as np
 
+from ldtrefl.base import budget
 from ldtrefl.base.errors import InputError
 from ldtrefl.files.srgb import linear_from_srgb
 from ldtrefl.scene.piece import Piece, unit_vectors
-from ldtrefl.scene.readers.corner_tables import split_corners
+from ldtrefl.scene.readers.corner_tables import split_corners, take_for_triangles
 from ldtrefl.scene.readers.mtl import MaterialLibrary
 from ldtrefl.scene.readers.obj_text import ObjTables, read_tables
 from ldtrefl.scene.readers.pictures import Beside, Pictures, file_beside
@@ -27,6 +28,12 @@ WITH_NORMALS = 1 << 30
 LOW = (1 << 32) - 1
 """The part of a key that is a smoothing group; above it stands a material."""
 
+BYTES_PER_COLOR = 100.0
+"""What a colour takes while it is decoded; measured."""
+
+BYTES_PER_PIECE = 2000.0
+"""What a piece takes besides its vertices and triangles, its material included; measured."""
+
 GREATEST_FRACTION = 1.0
 """Colours above it are taken for 0 to 255."""
 
@@ -37,11 +44,14 @@ def pieces_of_obj(data: bytes, beside: Beside) -> tuple[list[Piece], list[str]]:
     Raises:
         InputError: a line holds what it should not, or a face has a vertex that there is not.
     """
-    tables = read_tables(data)
-    notes = list(tables.not_shown)
-    _check(tables, notes)
-    triangles, faces = _triangles(tables, notes)
-    pieces = [(int(material), piece) for material, piece in _split(tables, triangles, faces, _colors(tables.colors))]
+    with budget.given_back():
+        tables = read_tables(data)
+        notes = list(tables.not_shown)
+        _check(tables, notes)
+        take_for_triangles(tables.sizes)
+        triangles, faces = _triangles(tables, notes)
+        pieces = _split(tables, triangles, faces, _colors(tables.colors))
+    budget.take(BYTES_PER_PIECE * len(pieces), f"{len(pieces)} materials")
     looks, faults = _materials(tables, beside)
     notes += faults
     return [_with_look(piece, looks[material], notes) for material, piece in pieces], notes
@@ -177,6 +187,7 @@ def _colors(stored: np.ndarray | None) -> np.ndarray | None:
     """(n, 4) float32 linear colours and alpha of the positions. The file's are sRGB, as Blender and MeshLab write."""
     if stored is None:
         return None
+    budget.take(BYTES_PER_COLOR * len(stored), "its colours")
     colors = np.nan_to_num(stored, nan=1.0, posinf=1.0, neginf=0.0)
     if colors.max() > GREATEST_FRACTION:
         is_white = (colors == 1.0).all(axis=1)

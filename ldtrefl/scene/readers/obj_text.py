@@ -16,11 +16,15 @@ from typing import Any
 
 import numpy as np
 
+from ldtrefl.base import budget
 from ldtrefl.base.errors import InputError
 from ldtrefl.scene.readers.text_numbers import Lines
 
-BLOCK = 1 << 22
+BLOCK = 1 << 20
 """Bytes of text that are read at a time, up to the next end of a line."""
+
+BYTES_PER_TEXT_BYTE = 50.0
+"""What a byte of a block takes while the block is read; measured."""
 
 LONGEST_LINE = 1 << 24
 """Bytes: what is longer, continued lines joined, is no line of numbers that anybody wrote."""
@@ -179,6 +183,10 @@ class _Reader:
             switches.add(lines.first + k, self.material, self.smoothing)
         return switches
 
+    def table_bytes(self) -> int:
+        """Bytes of the tables so far."""
+        return sum(part.nbytes for parts in self.tables.values() for part in parts)
+
     def joined(self) -> ObjTables:
         """All that was read."""
         tables: dict[str, Any] = {}
@@ -214,11 +222,19 @@ def read_tables(data: bytes) -> ObjTables:
     """The tables of an OBJ file.
 
     Raises:
-        InputError: a line holds what it should not; the message gives its number.
+        InputError: a line holds what it should not, of which the message gives the number; or it takes more memory than
+            is allowed.
     """
     reader, line = _Reader(), 1
+    longest, taken = 0, 0
     for block in _blocks(data.removeprefix(b"\xef\xbb\xbf")):
+        # Blocks are read one after another: the longest counts.
+        budget.take(BYTES_PER_TEXT_BYTE * max(len(block) - longest, 0), "a block of lines")
+        longest = max(longest, len(block))
         line = reader.read(block, line)
+        # All tables are put together at last, and then there are two of them.
+        budget.take(2.0 * (reader.table_bytes() - taken), "its tables")
+        taken = reader.table_bytes()
     if b"#MRGB" in data:
         reader.others["ZBrush's colours (#MRGB)"] = None
     return reader.joined()

@@ -12,15 +12,19 @@ from dataclasses import replace
 
 import numpy as np
 
+from ldtrefl.base import budget
 from ldtrefl.base.errors import InputError
 from ldtrefl.files.srgb import linear_from_srgb
 from ldtrefl.scene.piece import Piece, unit_vectors
-from ldtrefl.scene.readers.corner_tables import split_corners, with_vertices
+from ldtrefl.scene.readers.corner_tables import split_corners, take_for_triangles, with_vertices
 from ldtrefl.scene.readers.polygons import triangles_of
 from ldtrefl.scene.readers.text_numbers import Lines
 
 WORD = re.compile(rb"(ST)?(C)?(N)?(4)?(n)?OFF\b")
 COMMENT = re.compile(rb"#[^\n]*")
+
+BYTES_PER_TEXT_BYTE = 25.0
+"""What a byte of a file takes while its lines are read; measured."""
 
 LARGEST_FRACTION = 1.0
 """Colours of which one is above it go from 0 to 255."""
@@ -32,12 +36,20 @@ def pieces_of_off(data: bytes) -> tuple[list[Piece], list[str]]:
     Raises:
         InputError: it is damaged, has no faces, or a face has a vertex that there is not.
     """
+    with budget.given_back():
+        return _read(data)
+
+
+def _read(data: bytes) -> tuple[list[Piece], list[str]]:
+    budget.take(BYTES_PER_TEXT_BYTE * len(data), "its lines")
     letters, lines = _lines(data)
     counts, words = lines.rows(_some(lines, 0, 1), 0, least=2)
-    vertex_count, face_count = int(max(counts[0], 0)), int(max(counts[1], 0))
     has_words = int((lines.ends > lines.starts).sum())
-    if 1 + vertex_count + face_count > has_words:
-        raise InputError(f"the file ends among its {vertex_count} vertices and {face_count} faces")
+    if not (counts[:2] >= 0).all() or 1 + counts[0] + counts[1] > has_words:
+        raise InputError(f"the file ends among its {counts[0]:.0f} vertices and {counts[1]:.0f} faces")
+    vertex_count, face_count = int(counts[0]), int(counts[1])
+    if vertex_count == 0 or face_count == 0:
+        raise InputError("the mesh has no triangles: it says that it has no vertices or no faces")
     values, words = lines.rows(_some(lines, 1, vertex_count), 0, least=3)
     if vertex_count and (words != words[0]).any():
         raise InputError("the lines of vertices have different numbers of words")
@@ -49,6 +61,7 @@ def pieces_of_off(data: bytes) -> tuple[list[Piece], list[str]]:
         wrong = int(np.argmax((corners < 0) | (corners >= vertex_count)))
         face = int(np.searchsorted(np.cumsum(sizes), wrong, side="right"))
         raise InputError(f"face {face} has vertex {corners[wrong]}, allowed are 0 to {vertex_count - 1}")
+    take_for_triangles(sizes)
     is_polygon = sizes >= 3
     kept = np.flatnonzero(np.repeat(is_polygon, sizes))
     if not len(kept):

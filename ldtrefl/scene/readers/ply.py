@@ -10,10 +10,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from ldtrefl.base import budget
 from ldtrefl.base.errors import InputError
 from ldtrefl.files.srgb import linear_from_srgb
 from ldtrefl.scene.piece import Piece, unit_vectors
-from ldtrefl.scene.readers.corner_tables import split_corners, with_vertices
+from ldtrefl.scene.readers.corner_tables import split_corners, take_for_triangles, with_vertices
 from ldtrefl.scene.readers.pictures import Beside, Pictures
 from ldtrefl.scene.readers.ply_tables import Table, read_header, read_tables
 from ldtrefl.scene.readers.polygons import triangles_of
@@ -39,7 +40,16 @@ def pieces_of_ply(data: bytes, beside: Beside) -> tuple[list[Piece], list[str]]:
         InputError: it is damaged, has no faces, or a face has a vertex that there is not.
     """
     header = read_header(data)
-    tables = read_tables(data, header)
+    notes: list[str] = []
+    looks = _looks(header.comments, Pictures(beside), notes)
+    with budget.given_back():
+        tables = read_tables(data, header)
+        pieces = _pieces_of(tables, looks, notes)
+    return pieces, notes
+
+
+def _pieces_of(tables: dict[str, Table], looks: list[SurfaceMaterial], notes: list[str]) -> list[Piece]:
+    """The pieces of a file's tables."""
     vertices = tables.get("vertex")
     if vertices is None or not all(name in vertices.columns for name in POSITION):
         raise InputError("the header has no element 'vertex' with properties x, y and z")
@@ -50,6 +60,7 @@ def pieces_of_ply(data: bytes, beside: Beside) -> tuple[list[Piece], list[str]]:
         corner = int(np.argmax((corners < 0) | (corners >= len(points))))
         face = int(np.searchsorted(np.cumsum(sizes), corner, side="right"))
         raise InputError(f"face {face} has vertex {corners[corner]}, allowed are 0 to {len(points) - 1}")
+    take_for_triangles(sizes)
     is_polygon = sizes >= 3
     kept = np.flatnonzero(np.repeat(is_polygon, sizes))
     if not len(kept):
@@ -58,13 +69,14 @@ def pieces_of_ply(data: bytes, beside: Beside) -> tuple[list[Piece], list[str]]:
     of_face = np.repeat(np.flatnonzero(is_polygon), sizes[is_polygon] - 2)
     piece = Piece(points, corners[cut], None, None)
     piece = _with_vertex_values(piece, vertices, seen["vertex"])
-    notes = [] if is_polygon.all() else [f"{int((~is_polygon).sum())} faces of fewer than three corners"]
+    if not is_polygon.all():
+        notes.append(f"{int((~is_polygon).sum())} faces of fewer than three corners")
     faces = tables.get("face")
     if faces is not None:
         piece = _with_corner_values(piece, faces, cut, of_face, sizes, seen["face"])
-    looks = _looks(header.comments, Pictures(beside), notes)
     pieces = _by_picture(piece, faces, of_face, looks, seen["face"], notes)
-    return pieces, notes + _not_shown(tables, seen)
+    notes += _not_shown(tables, seen)
+    return pieces
 
 
 def _joined(table: Table, names: tuple[str, ...]) -> np.ndarray:

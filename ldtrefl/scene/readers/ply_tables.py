@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ldtrefl.base import budget
 from ldtrefl.base.errors import InputError
 from ldtrefl.scene.readers.text_numbers import Lines
 
@@ -24,6 +25,12 @@ LETTERS = {"i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "i8
 """NumPy's types in the terms of ``struct``."""
 
 FORMATS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
+
+BYTES_PER_TEXT_BYTE = 25.0
+"""What a byte of a table of text takes while it is read; measured."""
+
+BYTES_PER_ENTRY = 150.0
+"""The same of a property of a row that is read by itself."""
 
 LONGEST_HEADER = 1 << 20
 """Bytes."""
@@ -141,20 +148,10 @@ def read_tables(data: bytes, header: Header) -> dict[str, Table]:
     """All tables by their names.
 
     Raises:
-        InputError: the file ends among them, or holds what its header does not say.
+        InputError: the file ends among them or holds what its header does not say, or they take more memory than is
+            allowed.
     """
     return _text_tables(data, header) if not header.order else _binary_tables(data, header)
-
-
-def is_of_one_length(data: bytes, header: Header) -> bool:
-    """Whether the lists of each table of bytes have one length; then they are read at once, and take little memory."""
-    at = header.end
-    for element in header.elements:
-        lengths = _first_lengths(data, element, header.order, at)
-        if lengths is None or not _same_lengths(data, element, header.order, at, lengths):
-            return False
-        at += element.count * element.row(header.order, lengths).itemsize
-    return True
 
 
 def _binary_tables(data: bytes, header: Header) -> dict[str, Table]:
@@ -215,6 +212,9 @@ def _rows_one_by_one(data: bytes, element: Element, order: str, at: int) -> tupl
         (entry.name, int(entry.kind[1]), struct.Struct(order + LETTERS[entry.length]) if entry.length else None)
         for entry in element.properties
     ]
+    if element.count > len(data) - at:
+        raise _ends_early(element)
+    budget.take(BYTES_PER_ENTRY * element.count * len(steps), f"{element.count} rows of '{element.name}'")
     for _ in range(element.count):
         for name, size, length in steps:
             count = 1
@@ -235,6 +235,7 @@ def _rows_one_by_one(data: bytes, element: Element, order: str, at: int) -> tupl
 
 
 def _text_tables(data: bytes, header: Header) -> dict[str, Table]:
+    budget.take(BYTES_PER_TEXT_BYTE * len(data), "its tables")
     body = data[header.end :].replace(b"\r\n", b"\n").replace(b"\r", b"\n").replace(b"\t", b" ")
     lines = Lines.of(body if body.endswith(b"\n") else body + b"\n", header.lines + 1)
     has_words = np.flatnonzero(lines.ends > lines.starts)

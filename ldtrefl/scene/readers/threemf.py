@@ -84,7 +84,10 @@ class _Package:
         text = self.file(name)
         if b"<!DOCTYPE" in text or b"<!ENTITY" in text:
             raise InputError(f"{name}: XML with a document type is not read")
-        root = ElementTree.fromstring(text)
+        try:
+            root = ElementTree.fromstring(text)
+        except ElementTree.ParseError as error:
+            raise InputError(f"'{name}' in it is not XML ({error})") from error
         unit = root.get("unit", "millimeter")
         if unit not in MILLIMETRES:
             raise InputError(f"{name}: unit '{unit[:40]}', allowed are {', '.join(MILLIMETRES)}")
@@ -191,19 +194,30 @@ def pieces_of_3mf(data: bytes) -> tuple[list[Piece], list[str]]:
     Raises:
         InputError: it is damaged, or larger than is allowed.
     """
-    with zipfile.ZipFile(io.BytesIO(data)) as archive:
-        package = _Package(archive)
-        pictures = Pictures(package.file)
-        root = _root(archive)
-        package.read(root, pictures, is_root=True)
-        made: dict[Key, list[Piece]] = {}
-        pieces: list[Piece] = []
-        for item, start in package.items:
-            for key, matrix in package.placed(item, package.scaled(start, root)):
-                if key not in made:
-                    made[key] = package.pieces(key)
-                budget.take(joining_bytes(made[key]), f"object {key[1]}")
-                pieces += [moved(piece, matrix) for piece in made[key]]
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            return _pieces_of(archive)
+    except InputError:
+        raise
+    except (zipfile.BadZipFile, NotImplementedError) as error:
+        raise InputError(f"not an archive of ZIP that can be read ({error})") from error
+    except (KeyError, ValueError, OverflowError) as error:
+        raise InputError(f"something that is named is missing, or is no number ({error})") from error
+
+
+def _pieces_of(archive: zipfile.ZipFile) -> tuple[list[Piece], list[str]]:
+    package = _Package(archive)
+    pictures = Pictures(package.file)
+    root = _root(archive)
+    package.read(root, pictures, is_root=True)
+    made: dict[Key, list[Piece]] = {}
+    pieces: list[Piece] = []
+    for item, start in package.items:
+        for key, matrix in package.placed(item, package.scaled(start, root)):
+            if key not in made:
+                made[key] = package.pieces(key)
+            budget.take(joining_bytes(made[key]), f"object {key[1]}")
+            pieces += [moved(piece, matrix) for piece in made[key]]
     return pieces, package.notes + pictures.not_shown
 
 

@@ -10,6 +10,7 @@ import trimesh
 import ldtrefl
 from tests.conftest import REAL_MESHES
 from tests.mesh_writers import write_glb
+from tests.scene.readers.mutated_files import ending_of
 from tests.scene.readers.soft_box import MESH, SCENE, soft_box
 
 
@@ -68,3 +69,10 @@ def test_a_changed_file_is_read_again(tmp_path: Path) -> None:
     assert ldtrefl.load_mesh(path) is first
     trimesh.creation.icosphere(2).export(path)
     assert len(ldtrefl.load_mesh(path).faces) == 320
+
+
+def test_damaged_files_are_a_mesh_or_a_line(tmp_path: Path) -> None:
+    """A few of those that the script of ``mutated_files.py`` makes by the thousand."""
+    (tmp_path / "inside").mkdir()
+    endings = {ending_of(tmp_path / "inside", number) for number in range(140)}
+    assert endings == {"a mesh", "a line"}

@@ -102,7 +102,7 @@ def test_what_is_not_shown_is_named(tmp_path: Path, caplog: pytest.LogCaptureFix
     [
         ("", "the mesh has no triangles"),
         (mesh_object(1, TRIANGLE.replace('"2"', '"3"')), "triangle 0 has a vertex that there is not"),
-        ("<object", "not a mesh that can be read"),
+        ("<object", "is not XML"),
     ],
 )
 def test_what_is_wrong_is_a_line(tmp_path: Path, resources: str, says: str) -> None:
