@@ -31,8 +31,9 @@ AT_ONCE = 1 << 16
 SUNK = 1.0 / 2000.0
 """How far below the lowest point the floor is, as a share of the size: it must not coincide with a flat base."""
 
-SMALLEST_SHARE = 1e-9
-"""The smallest size of a subject, as a share of its largest coordinate: float64 can still place a camera before it."""
+SMALLEST_SHARE = 1e-12
+"""The smallest size of a subject, as a share of its largest coordinate: float64 can still tell where a camera
+before it stands."""
 
 
 LOWER = 0.6
@@ -51,7 +52,7 @@ class Subject:
         """Measure objects.
 
         Raises:
-            InputError: there are none, or one has no mesh.
+            InputError: there are none, one has no mesh, or all are one point.
         """
         if not objects:
             raise InputError("there is nothing to be seen: no object")
@@ -72,9 +73,13 @@ class Subject:
         used = [points[layout.meshes[number].is_used] for number, points in zip(layout.mesh_of, placed, strict=True)]
         box = np.array([[part.min(axis=0), part.max(axis=0)] for part in used])
         step = float((box[:, 1].max(axis=0) - box[:, 0].min(axis=0)).max()) / STEPS
-        for number, points in zip(layout.mesh_of, placed, strict=True):
-            used += _inside_large(points, layout.meshes[number].faces, step)
-        return cls(np.concatenate(used))
+        if step == 0.0:
+            raise InputError("there is nothing to be seen: all is in one point")
+        large = [
+            _large_triangles(placed[k], layout.meshes[layout.mesh_of[k]].faces, step)
+            for k in np.flatnonzero((box[:, 1] - box[:, 0]).max(axis=1) > step)
+        ]
+        return cls(np.concatenate([*used, *_points_inside(np.concatenate([np.empty((0, 3, 3)), *large]), step)]))
 
     @functools.cached_property
     def _extents(self) -> np.ndarray:
@@ -111,7 +116,7 @@ class Subject:
     def size(self) -> float:
         """The longest of width, depth and height."""
         least = SMALLEST_SHARE * float(np.abs(self.points).max())
-        return max(self.width, self.depth, self.height, least) or 1.0
+        return max(self.width, self.depth, self.height, least)
 
     @functools.cached_property
     def digits(self) -> int:
@@ -161,26 +166,33 @@ class Subject:
         return self.at(distance * np.cos(angle), distance * np.sin(angle), radius)
 
 
-def _inside_large(vertices: np.ndarray, faces: np.ndarray, step: float) -> list[np.ndarray]:
-    """(n, 3) points on those triangles that have an edge longer than ``step``, no farther apart than that, in parts.
-
-    A triangle whose longest edge is k steps is cut in k parts along each edge. So that there are not too many, k is at
-    most ``STEPS`` over the square root of how many hundreds of large triangles there are.
-    """
-    large, longest = [np.empty((0, 3, 3))], [np.empty(0)]
+def _large_triangles(vertices: np.ndarray, faces: np.ndarray, step: float) -> np.ndarray:
+    """(m, 3, 3) corners of those triangles that have an edge longer than ``step``."""
+    large = [np.empty((0, 3, 3))]
     for begin in range(0, len(faces), AT_ONCE):
         corners = vertices[faces[begin : begin + AT_ONCE]]
-        edges = corners - np.roll(corners, 1, axis=1)
-        lengths = np.sqrt(np.einsum("ijk,ijk->ij", edges, edges)).max(axis=1)
-        large.append(corners[lengths > step])
-        longest.append(lengths[lengths > step])
-    corners, lengths = np.concatenate(large), np.concatenate(longest)
-    most = max(2, round(2 * STEPS / math.sqrt(1.0 + len(corners) / 100.0)))
-    parts = np.minimum(np.ceil(lengths / step), most).astype(int)
+        large.append(corners[_longest_edges(corners) > step])
+    return np.concatenate(large)
+
+
+def _longest_edges(corners: np.ndarray) -> np.ndarray:
+    """(m,) lengths, of (m, 3, 3) corners of triangles."""
+    edges = corners - np.roll(corners, 1, axis=1)
+    return np.sqrt(np.einsum("ijk,ijk->ij", edges, edges)).max(axis=1)
+
+
+def _points_inside(corners: np.ndarray, step: float) -> list[np.ndarray]:
+    """(n, 3) points on triangles, given (m, 3, 3) corners, no farther apart than ``step``, in parts.
+
+    A triangle whose longest edge is k steps is cut in k parts along each edge. So that there are not too many points, k
+    is limited by the number of triangles: to 8 for ten thousand, to 1, which is no more than the corners, for a
+    million.
+    """
+    most = round(2 * STEPS / math.sqrt(1.0 + len(corners) / 100.0))
+    parts = np.minimum(np.ceil(_longest_edges(corners) / step), most).astype(int)
     found = []
-    for k in np.unique(parts):
+    for k in np.unique(parts[parts > 1]):
         first, second = (axis.ravel() for axis in np.meshgrid(range(k + 1), range(k + 1)))
-        inside = first + second <= k
-        weights = np.stack([first, second, k - first - second], axis=1)[inside] / k
+        weights = np.stack([first, second, k - first - second], axis=1)[first + second <= k] / k
         found.append(np.einsum("wc,tcx->twx", weights, corners[parts == k]).reshape(-1, 3))
     return found

@@ -25,7 +25,7 @@ def test_objects_stay_where_they_are_and_come_first(on: str | None) -> None:
 
 
 @pytest.mark.parametrize("on", [None, *STAGES])
-@pytest.mark.parametrize(("scale", "offset"), [(1e-6, 1e-6), (1e6, 1e6), (1.0, 1e6), (1e6, 0.0), (1e-3, 1.0)])
+@pytest.mark.parametrize(("scale", "offset"), [(1e-6, 1e-6), (1e6, 1e6), (1.0, 1e6), (1e6, 0.0), (1e-6, 1e6)])
 def test_a_scene_of_any_size_and_place_looks_the_same(on: str | None, scale: float, offset: float) -> None:
     """To the digits that coordinates are written with."""
     base = ldtrefl.render(composed((THING,), on, size=(48, 32))).image
