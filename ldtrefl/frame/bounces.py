@@ -28,8 +28,7 @@ from ldtrefl.frame.skip_options import SkipOptions
 from ldtrefl.frame.taken_rays import taken
 from ldtrefl.geometry.vectors import point_along
 from ldtrefl.shading.environment import environment_radiance
-from ldtrefl.shading.specular import mirror_direction
-from ldtrefl.shading.surface import Surface, extended_coordinates, may_return
+from ldtrefl.shading.surface import Surface, extended_coordinates, may_return, way_onwards
 from ldtrefl.shading.surfaces import GROUP, Sighting, look_along
 from ldtrefl.tracing.closest_hits import closest_hits_kernel
 from ldtrefl.tracing.nothing import no_shadows
@@ -93,9 +92,9 @@ def go_on(
     least_weight: float,
     onwards_out: RayBuffer,
 ) -> wp.vec3:
-    """Send ray ``i`` on from a mirror; or, if too little of what it brings would arrive, what the mirror reflects of
-    the environment."""
-    direction = mirror_direction(rays.direction[i], surface.normal, surface.facet)
+    """Send ray ``i`` on from a mirror, or behind what lets it through; or, if too little of what it brings would
+    arrive, what it would see there of the environment."""
+    direction = way_onwards(surface, rays.direction[i])
     onwards = wp.cw_mul(rays.throughput[i], surface.mirror)
     if wp.max(onwards) < least_weight:
         return wp.cw_mul(surface.mirror, environment_radiance(lighting, direction))
@@ -120,9 +119,9 @@ def add_brought(radiance: wp.array(dtype=wp.vec3), numbers: wp.array(dtype=wp.in
 
 
 @launch.once
-def shade_hits_kernel(tracer: Tracer, has_looks: bool) -> wp.Kernel:
+def shade_hits_kernel(tracer: Tracer, has_looks: bool, has_alpha: bool) -> wp.Kernel:
     """The kernel that adds what rays met to what they bring, and sends them on from mirrors."""
-    shaded = shaded_by(tracer, has_looks)
+    shaded = shaded_by(tracer, has_looks, has_alpha)
 
     @launch.kernel
     def shade_hits(
@@ -318,7 +317,7 @@ class RayFollower:
             weight = np.inf if is_last else self.limits.least_weight
             block = block_of(device)
             inputs = [block, rays, hits, scene.records, scene.top_level, scene.lighting, scene.looks, shadow.views]
-            kernel = shade_hits_kernel(shadow.tracer, scene.has_looks)
+            kernel = shade_hits_kernel(shadow.tracer, scene.has_looks, scene.has_dimmed_shadows)
             launch.launch(kernel, -(-count // block), [*inputs, places, weight, radiance, onwards], device)
         return hits, onwards
 

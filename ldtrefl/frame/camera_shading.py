@@ -9,8 +9,7 @@ from ldtrefl.device.bits import lowest_bit
 from ldtrefl.frame.backdrop import fill_backdrop
 from ldtrefl.frame.gbuffer import GBuffer, GBufferView, sight
 from ldtrefl.frame.shadows import shaded_by
-from ldtrefl.shading.specular import mirror_direction
-from ldtrefl.shading.surface import Surface, may_return
+from ldtrefl.shading.surface import Surface, may_return, way_onwards
 from ldtrefl.shading.surfaces import GROUP, Sighting, look_from
 from ldtrefl.tracing.nothing import no_shadows
 from ldtrefl.tracing.ray_buffers import RayBuffer, empty_rays
@@ -24,9 +23,9 @@ PIXELS_IN_A_ROW = 256
 
 
 @launch.once
-def shade_pixels_kernel(tracer: Tracer, has_looks: bool) -> wp.Kernel:
+def shade_pixels_kernel(tracer: Tracer, has_looks: bool, has_alpha: bool) -> wp.Kernel:
     """The kernel that shades what the camera sees, reflectors left out."""
-    shaded = shaded_by(tracer, has_looks)
+    shaded = shaded_by(tracer, has_looks, has_alpha)
 
     @launch.kernel
     def shade_pixels(
@@ -72,10 +71,10 @@ def shade_pixels_kernel(tracer: Tracer, has_looks: bool) -> wp.Kernel:
 
 @wp.func
 def start_ray(rays: RayBuffer, i: int, objects: wp.array(dtype=ObjectRecord), surface: Surface, direction: wp.vec3):
-    """Start ray ``i`` at a surface that is seen along unit ``direction``, in the mirrored direction. It is dead where
-    the surface reflects nothing: a look may say so from place to place."""
+    """Start ray ``i`` at a surface that is seen along unit ``direction``, in the mirrored direction or straight on. It
+    is dead where the surface reflects nothing: a look may say so from place to place."""
     rays.origin[i] = surface.position
-    rays.direction[i] = mirror_direction(direction, surface.normal, surface.facet)
+    rays.direction[i] = way_onwards(surface, direction)
     rays.throughput[i] = wp.vec3(1.0)
     rays.source[i] = wp.where(wp.max(surface.mirror) > 0.0, surface.object, -1)
     rays.source_triangle[i] = surface.triangle
@@ -83,10 +82,10 @@ def start_ray(rays: RayBuffer, i: int, objects: wp.array(dtype=ObjectRecord), su
 
 
 @launch.once
-def shade_reflectors_kernel(tracer: Tracer, starts_rays: bool, has_looks: bool) -> wp.Kernel:
+def shade_reflectors_kernel(tracer: Tracer, starts_rays: bool, has_looks: bool, has_alpha: bool) -> wp.Kernel:
     """The kernel that shades the pixels that see a reflector, without what it reflects, and starts their rays if
     ``starts_rays``."""
-    shaded, with_rays = shaded_by(tracer, has_looks), wp.constant(starts_rays)
+    shaded, with_rays = shaded_by(tracer, has_looks, has_alpha), wp.constant(starts_rays)
 
     @launch.kernel
     def shade_reflectors(
@@ -149,7 +148,7 @@ def shade_gbuffer(
         radiance = wp.empty(gbuffer.pixel_count, dtype=wp.vec3, device=device)
     block = PIXELS_IN_A_ROW if device.is_cpu else 1
     inputs = [block, gbuffer.view, scene.records, scene.top_level, scene.lighting, scene.looks, shadow.views, radiance]
-    kernel = shade_pixels_kernel(shadow.tracer, scene.has_looks)
+    kernel = shade_pixels_kernel(shadow.tracer, scene.has_looks, scene.has_dimmed_shadows)
     launch.launch(kernel, -(-gbuffer.pixel_count // block), inputs, device)
     return _with_reflectors(gbuffer, shadow, radiance, starts_rays=starts_rays)
 
@@ -166,7 +165,8 @@ def _with_reflectors(gbuffer: GBuffer, shadow: BoundTracer, radiance: wp.array, 
     scene, device, pixels = gbuffer.scene, gbuffer.scene.device, gbuffer.reflector_pixels
     count = pixels.shape[0]
     mirror, rays = wp.empty(count, dtype=wp.vec3, device=device), empty_rays(count if starts_rays else 0, device)
-    block, kernel = block_of(device), shade_reflectors_kernel(shadow.tracer, starts_rays, scene.has_looks)
+    block = block_of(device)
+    kernel = shade_reflectors_kernel(shadow.tracer, starts_rays, scene.has_looks, scene.has_dimmed_shadows)
     inputs = [block, pixels, gbuffer.view, scene.records, scene.top_level, scene.lighting, scene.looks, shadow.views]
     launch.launch(kernel, -(-count // block), [*inputs, rays, radiance, mirror], device)
     return Shaded(radiance, mirror, rays)

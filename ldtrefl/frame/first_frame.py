@@ -35,8 +35,8 @@ def kernels_of_rays(scene: DeviceScene, tracer: Tracer, skip: SkipOptions) -> li
     shadow = tracer if scene.lighting.shadows else NOTHING
     return [
         closest_hits_kernel(tracer, block_of(scene.device), skip.bounds),
-        shade_hits_kernel(shadow, scene.has_looks),
-        shade_pixels_kernel(shadow, scene.has_looks),
-        shade_reflectors_kernel(shadow, True, scene.has_looks),
+        shade_hits_kernel(shadow, scene.has_looks, scene.has_dimmed_shadows),
+        shade_pixels_kernel(shadow, scene.has_looks, scene.has_dimmed_shadows),
+        shade_reflectors_kernel(shadow, True, scene.has_looks, scene.has_dimmed_shadows),
         count_rays,
     ]

@@ -8,14 +8,20 @@ import warp as wp
 from ldtrefl.device import launch
 from ldtrefl.frame.shadow_terminator import rise_to_smooth
 from ldtrefl.geometry.sphere import sphere_entry
-from ldtrefl.geometry.vectors import as_double
+from ldtrefl.geometry.vectors import as_double, point_along
 from ldtrefl.shading.direct_light import make_shaded
-from ldtrefl.shading.surface import Surface
+from ldtrefl.shading.finish import coverage_of_part
+from ldtrefl.shading.surface import Surface, part_of
+from ldtrefl.tracing.hit import Hit
 from ldtrefl.tracing.nothing import NOTHING
 from ldtrefl.tracing.tracer import Query, Tracer
+from ldtrefl.world.look_records import Looks
 from ldtrefl.world.records import ObjectRecord
 from ldtrefl.world.top_level import STACK, TopLevel
 from ldtrefl.world.unit_rays import facet_towards, into_unit, start_above, start_above_own, unit_normal
+
+MOST_LAYERS = wp.constant(64)
+"""Surfaces of one object that light passes through, at most: what lies behind as many is dark."""
 
 
 @wp.struct
@@ -47,10 +53,25 @@ def shadow_ray(record: ObjectRecord, surface: Surface, towards: wp.vec3, distanc
     return shadow
 
 
+@wp.func
+def lets_through(objects: wp.array(dtype=ObjectRecord), looks: Looks, k: int) -> bool:
+    """Whether light may pass through an object's surface, by the alpha of its look."""
+    if objects[k].look < 0:
+        return False
+    return looks.records[objects[k].look].lets_through != 0
+
+
+@wp.func
+def coverage_at(objects: wp.array(dtype=ObjectRecord), looks: Looks, k: int, hit: Hit) -> float:
+    """How much light is stopped where a ray meets an object with a look."""
+    return coverage_of_part(objects, looks, k, part_of(objects, k, hit.triangle), hit.triangle, hit.u, hit.v)
+
+
 @launch.once
-def shaded_by(tracer: Tracer, has_looks: bool) -> Callable[..., wp.vec3]:
-    """``shaded`` with this tracer's shadows."""
-    is_occluded = tracer.occluded
+def passing(tracer: Tracer, has_alpha: bool) -> Callable[..., float]:
+    """``passed(views, objects, looks, k, shadow)``: the share of light, 0 to 1, that passes object ``k`` along a shadow
+    ray. Without ``has_alpha`` no object of the scene lets any through that a ray meets."""
+    is_occluded, find_hits = tracer.occluded, tracer.closest_hits
 
     @wp.func
     def is_in_the_way(views: Any, k: int, shadow: ShadowRay) -> bool:
@@ -67,17 +88,59 @@ def shaded_by(tracer: Tracer, has_looks: bool) -> Callable[..., wp.vec3]:
         return is_occluded(views, k, query, shadow.outwards)
 
     @wp.func
-    def is_lit(
+    def passed_or_not(
+        views: Any, objects: wp.array(dtype=ObjectRecord), looks: Looks, k: int, shadow: ShadowRay
+    ) -> float:
+        return wp.where(is_in_the_way(views, k, shadow), 0.0, 1.0)
+
+    @wp.func
+    def passed_in_part(
+        views: Any, objects: wp.array(dtype=ObjectRecord), looks: Looks, k: int, shadow: ShadowRay
+    ) -> float:
+        if not lets_through(objects, looks, k):
+            return passed_or_not(views, objects, looks, k, shadow)
+        query_memory, hit_memory = wp.zeros(shape=1, dtype=Query), wp.zeros(shape=1, dtype=Hit)
+        queries = wp.array(ptr=query_memory.ptr, shape=(1,), dtype=Query)
+        hits = wp.array(ptr=hit_memory.ptr, shape=(1,), dtype=Hit)
+        queries[0] = shadow.query
+        queries[0].origin = shadow.query.origin + as_double(shadow.rise)
+        share = float(1.0)
+        layers = int(0)
+        while layers < MOST_LAYERS and share > 0.0:
+            find_hits(views, k, queries, 1, hits)
+            if hits[0].triangle < 0:
+                return share
+            share = share * (1.0 - coverage_at(objects, looks, k, hits[0]))
+            # The ray goes on from the other side of the triangle.
+            behind = facet_towards(objects[k], hits[0].triangle, queries[0].direction)
+            origin = point_along(queries[0].origin, queries[0].direction, hits[0].t)
+            queries[0].origin = start_above_own(objects[k], hits[0].triangle, origin, behind)
+            queries[0].t_max = queries[0].t_max - hits[0].t
+            layers += 1
+        return 0.0
+
+    return passed_in_part if has_alpha else passed_or_not
+
+
+@launch.once
+def shaded_by(tracer: Tracer, has_looks: bool, has_alpha: bool) -> Callable[..., wp.vec3]:
+    """``shaded`` with this tracer's shadows. ``has_alpha`` says whether any object lets light through by its alpha."""
+    passed = passing(tracer, has_alpha)
+
+    @wp.func
+    def share_lit(
         views: Any,
         objects: wp.array(dtype=ObjectRecord),
         top: TopLevel,
+        looks: Looks,
         surface: Surface,
         towards: wp.vec3,
         distance: float,
-    ) -> bool:
+    ) -> float:
         nodes = wp.zeros(shape=STACK, dtype=wp.int32)
         nodes[0] = top.root
         waiting = int(1)
+        share = float(1.0)
         while waiting > 0:
             waiting -= 1
             node = top.nodes[nodes[waiting]]
@@ -91,19 +154,21 @@ def shaded_by(tracer: Tracer, has_looks: bool) -> Callable[..., wp.vec3]:
                     else:
                         k = child.first
                         shadow = shadow_ray(objects[k], surface, towards, distance, k == surface.object)
-                        if is_in_the_way(views, k, shadow):
-                            return False
-        return True
+                        share = share * passed(views, objects, looks, k, shadow)
+                        if share == 0.0:
+                            return share
+        return share
 
     @wp.func
     def always_lit(
         views: Any,
         objects: wp.array(dtype=ObjectRecord),
         top: TopLevel,
+        looks: Looks,
         surface: Surface,
         towards: wp.vec3,
         distance: float,
-    ) -> bool:
-        return True
+    ) -> float:
+        return 1.0
 
-    return make_shaded(always_lit if tracer is NOTHING else is_lit, has_looks)
+    return make_shaded(always_lit if tracer is NOTHING else share_lit, has_looks)

@@ -34,14 +34,14 @@ def at_most_largest(radiance: wp.vec3) -> wp.vec3:
     return wp.min(radiance, wp.vec3(LARGEST_RADIANCE))
 
 
-def make_direct_radiance(is_lit: Callable[..., bool], has_looks: bool) -> Callable[..., wp.vec3]:
-    """``direct_radiance(views, objects, top, lighting, surface, finishes)``: emitted and scattered radiance; the
+def make_direct_radiance(share_lit: Callable[..., float], has_looks: bool) -> Callable[..., wp.vec3]:
+    """``direct_radiance(views, objects, top, lighting, looks, surface, finishes)``: emitted and scattered radiance; the
     first of ``finishes`` counts only if ``has_looks``.
 
-    ``is_lit(views, objects, top, surface, direction, distance)`` answers whether light arrives from unit ``direction``,
-    from a light at ``distance``; it closes over a tracer, so shadows exist once for all tracers.
+    ``share_lit(views, objects, top, looks, surface, direction, distance)`` answers how much light arrives from unit
+    ``direction``, from a light at ``distance``, from 0 to 1; only what looks let through is between. It closes over a
+    tracer, so shadows exist once for all tracers.
     """
-
     with_looks = wp.constant(has_looks)
 
     @wp.func
@@ -50,6 +50,7 @@ def make_direct_radiance(is_lit: Callable[..., bool], has_looks: bool) -> Callab
         objects: wp.array(dtype=ObjectRecord),
         top: TopLevel,
         lighting: LightingRecord,
+        looks: Looks,
         surface: Surface,
         finishes: wp.array(dtype=Finish),
     ) -> wp.vec3:
@@ -70,10 +71,12 @@ def make_direct_radiance(is_lit: Callable[..., bool], has_looks: bool) -> Callab
             if with_looks:
                 cosine = wp.dot(finishes[0].normal, towards)
             if cosine > 0.0:
-                if is_lit(views, objects, top, surface, towards, distance):
-                    total += cosine * radiance
+                share = share_lit(views, objects, top, looks, surface, towards, distance)
+                if share > 0.0:
                     if with_looks:
+                        radiance = share * radiance
                         shine += wp.cw_mul(highlights(finishes, towards), radiance)
+                    total += cosine * radiance
         light = surface.emission + wp.cw_mul(surface.albedo, total)
         if with_looks:
             light += shine
@@ -82,13 +85,13 @@ def make_direct_radiance(is_lit: Callable[..., bool], has_looks: bool) -> Callab
     return direct_radiance
 
 
-def make_shaded(is_lit: Callable[..., bool], has_looks: bool) -> Callable[..., wp.vec3]:
+def make_shaded(share_lit: Callable[..., float], has_looks: bool) -> Callable[..., wp.vec3]:
     """``shaded(views, objects, top, lighting, looks, sightings, lane, surfaces)``: what ``direct_radiance`` gives for
     a lane's surface, of which what its object's colours, or its look, say is set first.
 
     ``has_looks`` says whether any object of the scene has a look.
     """
-    direct_radiance = make_direct_radiance(is_lit, has_looks)
+    direct_radiance = make_direct_radiance(share_lit, has_looks)
 
     @wp.func
     def shaded_without_looks(
@@ -103,7 +106,7 @@ def make_shaded(is_lit: Callable[..., bool], has_looks: bool) -> Callable[..., w
     ) -> wp.vec3:
         color_surface(objects, sightings, lane, surfaces)
         no_finishes = wp.array(ptr=wp.uint64(0), shape=(0,), dtype=Finish)
-        return direct_radiance(views, objects, top, lighting, surfaces[lane], no_finishes)
+        return direct_radiance(views, objects, top, lighting, looks, surfaces[lane], no_finishes)
 
     @wp.func
     def shaded_with_looks(
@@ -124,6 +127,6 @@ def make_shaded(is_lit: Callable[..., bool], has_looks: bool) -> Callable[..., w
             color_surface(objects, sightings, lane, surfaces)
             finishes[0].ambient = 1.0
             finishes[0].normal = surfaces[lane].normal
-        return direct_radiance(views, objects, top, lighting, surfaces[lane], finishes)
+        return direct_radiance(views, objects, top, lighting, looks, surfaces[lane], finishes)
 
     return shaded_with_looks if has_looks else shaded_without_looks

@@ -182,6 +182,12 @@ struct Finishes {
         return sum(scaled(of.low, by.low), scaled(of.high, by.high));
     }
 
+    // How much of the light that passes is stopped, by alpha.
+    SHARED float covered(int mode, float cutoff, float alpha) {
+        if (mode == MASK) return alpha >= cutoff ? 1.0f : 0.0f;
+        return mode == BLEND ? clamped(alpha, 0.0f, 1.0f) : 1.0f;
+    }
+
     // How a surface reflects and scatters, its textures counted in.
     struct Model {
         Three base, emission, specular_color, mirror;
@@ -197,6 +203,8 @@ struct Finishes {
         Three haze, coat_haze;   // what is reflected of the environment in place of rays
         float cosine, coat_cosine;  // by which these blur
         int is_by_coat;          // 1 if rays are mirrored at the varnish
+        Three behind;            // what is seen of the environment behind it in place of rays
+        int goes_through;        // 1 if rays go straight on
     };
 
     SHARED Three grey(float a) { return {a, a, a}; }
@@ -262,6 +270,25 @@ struct Finishes {
         made.haze = sends ? grey(0.0f) : base;
         made.coat_haze = grey(coat_sends ? 0.0f : coat);
         made.is_by_coat = coat_sends && (!sends || coat > most);
+        made.behind = grey(0.0f);
+        made.goes_through = 0;
+    }
+
+    // What a surface of this coverage, below 1, lets through. A ray goes on along the heavier of its two ways, and the
+    // environment stands for the other.
+    APART void let_through(float coverage, Layers& of) {
+        Three* const parts[] = {
+            &of.diffuse, &of.emission, &of.low, &of.high, &of.coat_low, &of.coat_high, &of.mirror, &of.haze, &of.coat_haze
+        };
+        for (Three* part : parts) *part = scaled(coverage, *part);
+        const float through = 1.0f - coverage;
+        of.goes_through = through >= largest(of.mirror);
+        if (of.goes_through) {
+            (of.is_by_coat ? of.coat_haze : of.haze) = sum(of.is_by_coat ? of.coat_haze : of.haze, of.mirror);
+            of.mirror = grey(through);
+        } else {
+            of.behind = grey(through);
+        }
     }
 
     // An environment of two colours, or of a picture in longitude and latitude and its rough ones.

@@ -60,7 +60,7 @@ class Finish:
 
 
 LOOK_CONSTANTS = (
-    *("REPEAT", "CLAMP", "MIRROR", "LINEAR_FLOATS", "SRGB_BYTES"),
+    *("MASK", "BLEND", "REPEAT", "CLAMP", "MIRROR", "LINEAR_FLOATS", "SRGB_BYTES"),
     *("SLOTS", "BASE", "METALLIC_ROUGHNESS", "NORMAL", "OCCLUSION", "EMISSION"),
     *("SPECULAR", "SPECULAR_COLOR", "CLEARCOAT", "CLEARCOAT_ROUGHNESS"),
 )
@@ -94,8 +94,9 @@ const auto vec3 = [](const Three& a) { return wp::vec3(a.x, a.y, a.z); };
 const auto color_of = [](const Texel& a) { return Three{a.x, a.y, a.z}; };
 const auto* face = record.faces.data + sighting.triangle;
 const float weight[3] = {1.0f - sighting.u - sighting.v, sighting.u, sighting.v};
-
-// Read the textures, of which v = 0 is at the top row.
+"""
+PICTURE = """
+// A texture with its picture.
 const auto picture_of = [&](int number) {
     const auto& of = look.textures.data[number];
     Finishes::Picture made;
@@ -115,6 +116,9 @@ const auto picture_of = [&](int number) {
     made.decoded = looks.decoded.data;
     return made;
 };
+"""
+TEXTURES = """
+// Read the textures, of which v = 0 is at the top row.
 const auto uvs_of = [&](int number, float* uv) {
     const auto* uvs = look.textures.data[number].uv_set ? look.second_uvs.data : look.uvs.data;
     for (int c = 0; c < 3; ++c) {
@@ -134,12 +138,14 @@ for (int slot = 0; slot < SLOTS; ++slot) {
     texels[slot] = Finishes::sample(picture_of(number), u, v);
 }
 Three base = Finishes::product(three(material.base), color_of(texels[BASE]));
+float alpha = material.alpha * texels[BASE].w;
 if (look.colors.shape[0])
-    for (int i = 0; i < 3; ++i) {
+    for (int i = 0; i < 4; ++i) {
         float mean = 0.0f;
         for (int c = 0; c < 3; ++c) mean += weight[c] * look.colors.data[(*face)[c]][i];
-        (&base.x)[i] *= mean;
+        (i < 3 ? (&base.x)[i] : alpha) *= mean;
     }
+const float coverage = Finishes::covered(material.alpha_mode, material.alpha_cutoff, alpha);
 """
 BEND = """
 // Let the normal map bend the normal.
@@ -198,6 +204,7 @@ Finishes::Layers layers;
 Finishes::lay(
     model, (const float*)looks.shares.data, -Finishes::dot(normal, view), -Finishes::dot(smooth, view), layers
 );
+if (coverage < 1.0f) Finishes::let_through(coverage, layers);
 """
 HAZE = """
 // Add what is reflected of the environment in place of rays.
@@ -223,12 +230,14 @@ around.rough = (const float*)looks.environment.data;
 around.levels = looks.environment.shape[0];
 around.rows = looks.environment.shape[1];
 around.columns = looks.environment.shape[2];
-for (int coat = 0; coat < 2; ++coat) {
-    const Three share = coat ? layers.coat_haze : layers.haze;
+for (int part = 0; part < 3; ++part) {
+    const Three share = part == 0 ? layers.haze : part == 1 ? layers.coat_haze : layers.behind;
     if (!(Finishes::largest(share) > 0.0f)) continue;
-    const Three leaving = Finishes::mirrored(view, coat ? smooth : normal, three(surface.facet));
-    const float roughness = coat ? model.coat_roughness : model.roughness;
-    const Three light = Finishes::hazy(around, leaving, roughness, coat ? layers.coat_cosine : layers.cosine);
+    const Three leaving =
+        part == 2 ? view : Finishes::mirrored(view, part == 1 ? smooth : normal, three(surface.facet));
+    const float roughness = part == 0 ? model.roughness : part == 1 ? model.coat_roughness : 0.0f;
+    const float cosine = part == 0 ? layers.cosine : part == 1 ? layers.coat_cosine : 1.0f;
+    const Three light = Finishes::hazy(around, leaving, roughness, cosine);
     layers.emission = Finishes::sum(layers.emission, Finishes::product(share, light));
 }
 """
@@ -243,18 +252,19 @@ finish.high = material.has_highlights ? vec3(layers.high) : wp::vec3(0.0f);
 finish.coat_low = vec3(layers.coat_low);
 finish.coat_high = vec3(layers.coat_high);
 finish.highlights = model.clearcoat > 0.0f ? 2 : material.has_highlights && Finishes::largest(layers.high) > 0.0f;
-const float alpha = Finishes::larger(model.roughness, LEAST_ROUGHNESS);
-const float coat_alpha = Finishes::larger(model.coat_roughness, LEAST_ROUGHNESS);
-finish.alpha = alpha * alpha;
-finish.coat_alpha = coat_alpha * coat_alpha;
+const float rough = Finishes::larger(model.roughness, LEAST_ROUGHNESS);
+const float coat_rough = Finishes::larger(model.coat_roughness, LEAST_ROUGHNESS);
+finish.alpha = rough * rough;
+finish.coat_alpha = coat_rough * coat_rough;
 surface.normal = vec3(layers.is_by_coat ? smooth : normal);
 surface.albedo = vec3(layers.diffuse);
 surface.emission = vec3(layers.emission);
 surface.mirror = vec3(layers.mirror);
+surface.goes_through = layers.goes_through;
 """
 
 
-@wp.func_native(native_body(CONSTANTS, FILES, READ + BEND + LAY + HAZE + STORE))
+@wp.func_native(native_body(CONSTANTS, FILES, READ + PICTURE + TEXTURES + BEND + LAY + HAZE + STORE))
 def finish_part(
     objects: wp.array(dtype=ObjectRecord),
     looks: Looks,
@@ -266,6 +276,43 @@ def finish_part(
     finishes: wp.array(dtype=Finish),
 ):
     """Set the colours and the normal of a lane's surface, on a part of an object with a look; and the first finish."""
+    ...
+
+
+FIND = """
+const auto& record = objects.data[k];
+const auto& look = looks.records.data[record.look];
+const auto& material = look.materials.data[part];
+if (material.alpha_mode != MASK && material.alpha_mode != BLEND) return 1.0f;
+"""
+COVER = """
+const auto* face = record.faces.data + triangle;
+const float weight[3] = {1.0f - u - v, u, v};
+float alpha = material.alpha;
+const int number = material.slots > BASE ? material.textures[BASE] : -1;
+if (number >= 0) {
+    const auto* uvs = look.textures.data[number].uv_set ? look.second_uvs.data : look.uvs.data;
+    float s = 0.0f, t = 0.0f;
+    for (int c = 0; c < 3; ++c) {
+        s += weight[c] * uvs[(*face)[c]][0];
+        t += weight[c] * (1.0f - uvs[(*face)[c]][1]);
+    }
+    alpha *= Finishes::sample(picture_of(number), s, t).w;
+}
+if (look.colors.shape[0]) {
+    float mean = 0.0f;
+    for (int c = 0; c < 3; ++c) mean += weight[c] * look.colors.data[(*face)[c]][3];
+    alpha *= mean;
+}
+return Finishes::covered(material.alpha_mode, material.alpha_cutoff, alpha);
+"""
+
+
+@wp.func_native(native_body(CONSTANTS, FILES, FIND + PICTURE + COVER))
+def coverage_of_part(
+    objects: wp.array(dtype=ObjectRecord), looks: Looks, k: int, part: int, triangle: int, u: float, v: float
+) -> wp.float32:
+    """How much of the light that passes a triangle of object ``k``, which has a look, is stopped there by its alpha."""
     ...
 
 

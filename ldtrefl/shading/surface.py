@@ -9,6 +9,7 @@ import warp as wp
 
 from ldtrefl.geometry.triangle import ONE_THIRD, plane_coordinates
 from ldtrefl.geometry.vectors import as_single
+from ldtrefl.shading.specular import mirror_direction
 from ldtrefl.shading.textures import sample_texture
 from ldtrefl.world.records import ObjectRecord
 
@@ -34,7 +35,8 @@ class Surface:
     is_back: int  # 1 if the viewer sees the triangle's back, by its winding
     albedo: wp.vec3  # times the texture
     emission: wp.vec3
-    mirror: wp.vec3  # specular reflectance in this direction, Fresnel included
+    mirror: wp.vec3  # specular reflectance in this direction, Fresnel included; or what is let through
+    goes_through: int  # 1 if rays go straight on behind it, rather than being mirrored
 
 
 @wp.func
@@ -89,6 +91,14 @@ def albedo_at(objects: wp.array(dtype=ObjectRecord), index: int, triangle: int, 
         )
         color = wp.cw_mul(color, sample_texture(objects, index, place, uv))
     return color
+
+
+@wp.func
+def way_onwards(surface: Surface, direction: wp.vec3) -> wp.vec3:
+    """The unit direction in which a ray goes on that arrives along ``direction``: mirrored, or straight on."""
+    if surface.goes_through != 0:
+        return direction
+    return mirror_direction(direction, surface.normal, surface.facet)
 
 
 @wp.func

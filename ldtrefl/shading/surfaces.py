@@ -100,6 +100,7 @@ for (int i = 0; i < Surfaces::WIDE; ++i) {
     surface.albedo = albedo;
     surface.emission = record.emission;
     surface.mirror = record.mirror;
+    surface.goes_through = 0;
 }
 """
 

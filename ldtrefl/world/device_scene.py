@@ -177,6 +177,11 @@ class DeviceScene:
         return bool((self._records["look"] >= 0).any())
 
     @functools.cached_property
+    def has_dimmed_shadows(self) -> bool:
+        """Whether any object's shadow lets light through, by its alpha: else kernels are built that ask of none."""
+        return self.scene.lighting.shadows and bool(self._looks.let_through(self._records["look"]).any())
+
+    @functools.cached_property
     def is_reflector(self) -> np.ndarray:
         """(objects,) bool: from which rays may be sent."""
         return np.asarray(self._records["reflects"] > 0)

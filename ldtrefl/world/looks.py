@@ -75,6 +75,8 @@ class Look:
     record: LookRecord
     reflects: bool
     """Whether rays may be sent from some part of it."""
+    lets_through: bool
+    """Whether some part lets light through by its alpha."""
     shines: bool
     """Whether some part reflects anything at all."""
 
@@ -109,7 +111,9 @@ def look_of(
     for name, array in arrays.items():
         setattr(look, name, array)
     shines = any(record.has_mirror or material.reflects for record, material in zip(records, looks, strict=True))
-    return Look(look, any(record.reflects for record in records), shines)
+    lets_through = any(material.alpha_mode != "opaque" for material in looks)
+    look.lets_through = int(lets_through)
+    return Look(look, any(record.reflects for record in records), lets_through, shines)
 
 
 def overridden(material: SurfaceMaterial, own: Material, *, is_of_file: bool) -> SurfaceMaterial:
@@ -168,7 +172,8 @@ def _material_record(
         if texture is not None and texture.uv_set < len(uv_sets) and uv_sets[texture.uv_set]:
             numbers[slot] = pool.number_of(texture)
     record.textures = SlotNumbers(*numbers)
-    record.reflects = int(not material.is_unlit and _may_send_rays(material, own, reflection))
+    may_mirror = not material.is_unlit and _may_send_rays(material, own, reflection)
+    record.reflects = int(may_mirror or material.alpha_mode != "opaque")
     record.slots = max((slot + 1 for slot, number in enumerate(numbers) if number >= 0), default=0)
     return record
 

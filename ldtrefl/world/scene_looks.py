@@ -59,6 +59,11 @@ class SceneLooks:
         of_look = np.array([*(look.reflects for look in self._looks), False], bool)
         return of_look[numbers]
 
+    def let_through(self, numbers: np.ndarray) -> np.ndarray:
+        """(n,) bool: whether looks of these numbers let light through by their alpha; False for -1."""
+        of_look = np.array([*(look.lets_through for look in self._looks), False], bool)
+        return of_look[numbers]
+
     def struct(self, environment: StoredPicture | None) -> Looks:
         """All looks as kernels read them, in an environment. An earlier answer stays as it was."""
         before = self._struct

@@ -23,17 +23,21 @@ LITTLE = 1
 has a fault in some versions."""
 
 
+LOOKS = ((False, False), (True, False), (True, True))
+"""Whether any object has a look, and whether any lets light through."""
+
+
 def all_kernels() -> list[wp.Kernel]:
     for tracer in (BVH, *TRACERS.values()):
         batch_kernel(tracer, 1)
         batch_kernel(tracer, 1, True)
         closest_hits_kernel(tracer, 1)
         search_pixels_kernel(tracer, 1)
-    for tracer, has_looks in itertools.product((NOTHING, BVH, *TRACERS.values()), (False, True)):
-        shade_hits_kernel(tracer, has_looks)
-        shade_pixels_kernel(tracer, has_looks)
-        shade_reflectors_kernel(tracer, True, has_looks)
-        shade_reflectors_kernel(tracer, False, has_looks)
+    for tracer, looks in itertools.product((NOTHING, BVH, *TRACERS.values()), LOOKS):
+        shade_hits_kernel(tracer, *looks)
+        shade_pixels_kernel(tracer, *looks)
+        shade_reflectors_kernel(tracer, True, *looks)
+        shade_reflectors_kernel(tracer, False, *looks)
     return [kernel for kernel in launch.KERNELS if kernel.func.__module__.startswith("ldtrefl.")]
 
 
