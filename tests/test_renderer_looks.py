@@ -1,4 +1,4 @@
-"""Frames of scenes whose objects have looks: both methods agree, history changes no bit, parts reflect by themselves."""
+"""Frames of scenes whose objects have looks: methods agree, history changes no bit, parts reflect by themselves."""
 
 from __future__ import annotations
 
