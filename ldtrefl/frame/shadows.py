@@ -8,6 +8,7 @@ import warp as wp
 from ldtrefl.device import launch
 from ldtrefl.frame.shadow_terminator import rise_to_smooth
 from ldtrefl.geometry.sphere import sphere_entry
+from ldtrefl.geometry.triangle import ONE_THIRD
 from ldtrefl.geometry.vectors import as_double, point_along
 from ldtrefl.shading.direct_light import make_shaded
 from ldtrefl.shading.finish import coverage_of_part
@@ -63,8 +64,10 @@ def lets_through(objects: wp.array(dtype=ObjectRecord), looks: Looks, k: int) ->
 
 @wp.func
 def coverage_at(objects: wp.array(dtype=ObjectRecord), looks: Looks, k: int, hit: Hit) -> float:
-    """How much light is stopped where a ray meets an object with a look."""
-    return coverage_of_part(objects, looks, k, part_of(objects, k, hit.triangle), hit.triangle, hit.u, hit.v)
+    """How much light is stopped where a ray meets an object with a look; in the middle of a triangle that stands for
+    others (the linear search's)."""
+    u, v = wp.where(hit.u < 0.0, ONE_THIRD, hit.u), wp.where(hit.u < 0.0, ONE_THIRD, hit.v)
+    return coverage_of_part(objects, looks, k, part_of(objects, k, hit.triangle), hit.triangle, u, v)
 
 
 @launch.once
