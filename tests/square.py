@@ -37,6 +37,7 @@ def seen(
     from_below: bool = False,
     method: str = "bvh",
     lights: tuple[Light, ...] = (),
+    parts: dict[str, Material] | None = None,
     **scene: object,
 ) -> np.ndarray:
     """(h, w, 3) what a camera sees that looks down on the square with +y up, from far enough that rays are parallel to
@@ -44,6 +45,6 @@ def seen(
     height = -1000.0 if from_below else 1000.0
     fov = float(2.0 * np.degrees(np.arctan(1.0 / 1000.0)))
     camera = Camera(eye=(0, 0, height), look_at=(0, 0, 0), up=(0, 1, 0), width=PIXELS, height=PIXELS, fov_y=fov)
-    thing = Object(mesh=mesh, material=Material() if material is None else material)
+    thing = Object(mesh=mesh, material=Material() if material is None else material, parts=parts or {})
     given = {"environment": DARK, "lighting": WHITE, "lights": lights, **scene}
     return ldtrefl.render(Scene(camera=camera, objects=(thing,), **given), method).image

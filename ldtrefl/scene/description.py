@@ -7,6 +7,7 @@ dataclass may be built in Python with the same names and checks as the file's ke
 from __future__ import annotations
 
 import dataclasses
+import fnmatch
 import functools
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
@@ -158,6 +159,9 @@ class Object:
     smooth: Flag = True
     """Shading normals: interpolated, or the facet's."""
     material: Material = Material()
+    parts: Mapping[str, Material] = Field(default_factory=dict)
+    """Names of materials of the mesh's file, or patterns of such with * and ?: what is said of those parts in place of
+    ``material``. The first that fits counts."""
 
     def __post_init__(self) -> None:
         # No validators of the class: they would be asked again when a scene takes the object.
@@ -170,12 +174,14 @@ class Object:
         x, y, z, _ = self.rotate
         if abs(x) < SMALLEST and abs(y) < SMALLEST and abs(z) < SMALLEST:
             raise ValueError(f"rotate: the axis must not be the zero vector, nor shorter than {SMALLEST:g}")
-        if (excess := self.material.excess) is not None:
-            total, channel = excess
-            warn_once(
-                f"object '{self.called}': material.albedo and material.mirror add up to {total:.3g} in "
-                f"{channel}: above 1 it gives back more light than falls on it"
-            )
+        for key, material in {"material": self.material, **self.parts}.items():
+            if (excess := material.excess) is not None:
+                total, channel = excess
+                named = printable(key)
+                warn_once(
+                    f"object '{self.called}': {named}.albedo and {named}.mirror add up to {total:.3g} in {channel}: "
+                    "above 1 it gives back more light than falls on it"
+                )
 
     @property
     def called(self) -> str:
@@ -229,10 +235,15 @@ class Object:
         """The picture that ``material.texture`` names; None without one."""
         return self.material.picture
 
+    def material_of(self, name: str) -> Material:
+        """What the scene says of a part whose material has this name in the mesh's file."""
+        found = (material for pattern, material in self.parts.items() if fnmatch.fnmatchcase(name, pattern))
+        return next(found, self.material)
+
     @property
     def is_reflector(self) -> bool:
-        """Whether the object mirrors."""
-        return any(self.material.mirror)
+        """Whether the scene makes the object, or a part of it, a mirror."""
+        return any(any(material.mirror) for material in (self.material, *self.parts.values()))
 
     def world_from_object(self) -> np.ndarray:
         """The object's place: (4, 4) float64, from the mesh's own coordinates to the world.

@@ -6,6 +6,7 @@
     rotate = [0.0, 0.0, 1.0, 90.0]
     translate = [0.0, 0.0, 0.5]
     lights = true                   # bring its lights
+    parts = { "glass*" = { mirror = 0.9 } }  # what is said of nodes or materials of these names
 
 Its nodes become objects under their names, its lights are added to the scene's, and where the scene file has no
 ``[camera]``, its first camera is taken. glTF is y up: the file is turned so that it stands upright in a scene whose
@@ -15,7 +16,8 @@ camera's ``up`` is an axis, as z is without one.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+import fnmatch
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -24,8 +26,9 @@ from pydantic import BeforeValidator, Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
 from ldtrefl.base.checked import CONFIG, Flag, Number, Scale, Text, Vector, plain, refusing_in_one_line
-from ldtrefl.base.errors import InputError, first_fault
+from ldtrefl.base.errors import InputError, first_fault, unknown_name
 from ldtrefl.scene.description import Camera, Scene
+from ldtrefl.scene.material import Material
 from ldtrefl.scene.placement import placements
 from ldtrefl.scene.scene_parts import SceneParts
 
@@ -46,6 +49,8 @@ class Include:
     translate: Vector = (0.0, 0.0, 0.0)
     lights: Flag = True
     """Whether its lights are brought."""
+    parts: Mapping[str, Material] = Field(default_factory=dict)
+    """Names of its nodes or materials, or patterns of such with * and ?: what is said of them in place of the file."""
 
 
 _ADAPTER: TypeAdapter[Any] = TypeAdapter(dict[str, Annotated[list[Include], Field(max_length=MOST_INCLUDES)]])
@@ -86,7 +91,8 @@ def read_includes(includes: list[Include], find: Callable[[str, str], str], up: 
         key = f"include[{number}]"
         path = find(include.file, f"{key}.file")
         try:
-            found.append(moved_as_told(scene_parts(Path(path), up=up), include))
+            parts = told(scene_parts(Path(path), up=up), _with_pictures_found(include, key, find))
+            found.append(moved_as_told(parts, include))
         except InputError as error:
             raise error.within(key) from None
     return found
@@ -113,6 +119,40 @@ def up_axis(camera: Camera | None) -> str:
     if np.count_nonzero(up) != 1:
         return "z"
     return ("" if up[axis] > 0 else "-") + "xyz"[axis]
+
+
+def _with_pictures_found(include: Include, key: str, find: Callable[[str, str], str]) -> dict[str, Material]:
+    """The materials of ``parts`` with the paths of the pictures that they name."""
+    found = dict(include.parts)
+    for name, own in include.parts.items():
+        if own.texture is not None:
+            texture = find(own.texture, f"{key}.parts.{name}.texture")
+            found[name] = dataclasses.replace(own, texture=texture)
+    return found
+
+
+def told(parts: SceneParts, materials: Mapping[str, Material]) -> SceneParts:
+    """Parts of a scene with what is said of nodes and materials of these names.
+
+    Raises:
+        InputError: a name fits neither.
+    """
+    for name in materials:
+        if not any(fnmatch.fnmatchcase(known, name) for known in _known_names(parts)):
+            raise unknown_name("node or material", name, _known_names(parts)).within(f"parts.{name}")
+    if not materials:
+        return parts
+    objects = []
+    for entry in parts.objects:
+        own = next((own for name, own in materials.items() if fnmatch.fnmatchcase(entry.name, name)), entry.material)
+        objects.append(entry.changed(material=own, parts=dict(materials)))
+    return dataclasses.replace(parts, objects=tuple(objects))
+
+
+def _known_names(parts: SceneParts) -> set[str]:
+    """Names of nodes and materials."""
+    materials = {part.material.name for entry in parts.objects for part in entry.geometry.parts}
+    return {entry.name for entry in parts.objects} | materials - {""}
 
 
 def moved_as_told(parts: SceneParts, include: Include) -> SceneParts:

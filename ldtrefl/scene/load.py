@@ -22,6 +22,7 @@ from ldtrefl.base.errors import InputError, first_fault
 from ldtrefl.scene.description import Camera, Environment, Object, Scene
 from ldtrefl.scene.framing import check_size
 from ldtrefl.scene.includes import Include, read_includes, split_includes, up_axis, with_includes
+from ldtrefl.scene.material import Material
 from ldtrefl.scene.mesh import Mesh
 from ldtrefl.scene.mesh_scene import mesh_scene
 from ldtrefl.scene.places import split_places, standing_in
@@ -116,11 +117,19 @@ def _load_toml(path: Path) -> Scene:
     except ValidationError as error:
         allowed = _allowed_keys(Scene)
         allowed["object"] += ["place", "places"]
+        allowed |= {f"object.parts.{name}": allowed["object.material"] for name in _named_parts(tables)}
         raise first_fault(error, allowed).within(str(path)) from None
     except InputError as error:
         raise error.within(str(path)) from None
     with budget.account():
         return _found(scene, places, standing, path, included, includes)
+
+
+def _named_parts(tables: dict[str, Any]) -> set[str]:
+    """The names under ``parts`` of all objects of a scene file."""
+    entries = tables.get("object")
+    listed = [entry.get("parts") for entry in entries if isinstance(entry, dict)] if isinstance(entries, list) else []
+    return {name for parts in listed if isinstance(parts, dict) for name in parts}
 
 
 def _included(tables: dict[str, Any], includes: list[Include], path: Path) -> list[SceneParts]:
@@ -196,10 +205,12 @@ def _found_object(entry: Object, key: str, path: Path, shared: SharedGeometries)
     found = _with_files_found(entry, key, path)
     kind = "mesh" if entry.shape is None else "shape"
     _at(path, f"{key}.{kind}", lambda: shared.give(found))
-    if found.material.texture is not None:
-        _at(path, f"{key}.material.texture", lambda: found.texture)
-        if found.geometry.uvs is None:
-            raise InputError(f"{path}: {key}.material.texture: the object has no texture coordinates (UVs)")
+    materials = {"material": found.material} | {f"parts.{name}": own for name, own in found.parts.items()}
+    for name, material in materials.items():
+        if material.texture is not None:
+            _at(path, f"{key}.{name}.texture", functools.partial(getattr, material, "picture"))
+            if found.geometry.uvs is None:
+                raise InputError(f"{path}: {key}.{name}.texture: the object has no texture coordinates (UVs)")
     return found
 
 
@@ -209,9 +220,18 @@ def _with_files_found(entry: Object, key: str, path: Path) -> Object:
     if isinstance(entry.mesh, str):
         changes["mesh"] = _beside(path, entry.mesh, f"{key}.mesh")
     if entry.material.texture is not None:
-        texture = _beside(path, entry.material.texture, f"{key}.material.texture")
-        changes["material"] = dataclasses.replace(entry.material, texture=texture)
+        changes["material"] = _with_picture_found(entry.material, f"{key}.material", path)
+    if entry.parts:
+        parts = entry.parts.items()
+        changes["parts"] = {name: _with_picture_found(own, f"{key}.parts.{name}", path) for name, own in parts}
     return dataclasses.replace(entry, **changes) if changes else entry
+
+
+def _with_picture_found(material: Material, key: str, path: Path) -> Material:
+    """A material with the path of the picture that it names."""
+    if material.texture is None:
+        return material
+    return dataclasses.replace(material, texture=_beside(path, material.texture, f"{key}.texture"))
 
 
 def _found_environment(environment: Environment, path: Path) -> Environment:

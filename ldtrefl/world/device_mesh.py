@@ -9,8 +9,7 @@ import warp as wp
 
 from ldtrefl.device import warp_abi
 from ldtrefl.files.stored_picture import StoredPicture
-from ldtrefl.scene.description import Reflection
-from ldtrefl.scene.material import Material
+from ldtrefl.scene.description import Object, Reflection
 from ldtrefl.scene.mesh import Mesh
 from ldtrefl.world.appearance import Appearance, appearance_of
 from ldtrefl.world.clusters import Clusters, clustered
@@ -88,12 +87,13 @@ class DeviceMesh:
         """Whether the mesh's file says more of its surface than colours and plain pictures."""
         return mesh_needs_look(self.mesh)
 
-    def look(self, material: Material, reflection: Reflection) -> Look:
+    def look(self, source: Object, reflection: Reflection) -> Look:
         """The look of an object with this mesh. Objects of which the scene says the same share one."""
-        key = (material.key, reflection.threshold, reflection.rough_limit)
+        owns = [source.material_of(part.material.name) for part in self.mesh.parts]
+        key = (tuple(own.key for own in owns), reflection.threshold, reflection.rough_limit)
         if key not in self._looks:
             arrays, device = self._look_arrays, self.vertices.device
-            self._looks[key] = look_of(self.mesh, material, reflection, arrays, device)
+            self._looks[key] = look_of(self.mesh, owns, reflection, arrays, device)
         return self._looks[key]
 
     @functools.cached_property

@@ -83,7 +83,7 @@ class Look:
 
 def look_of(
     mesh: Mesh,
-    own: Material,
+    owns: Sequence[Material],
     reflection: Reflection,
     arrays: dict[str, wp.array],
     device: wp.Device,
@@ -92,7 +92,7 @@ def look_of(
 
     Args:
         mesh: its mesh.
-        own: what the scene says of it.
+        owns: what the scene says of each of the mesh's parts.
         reflection: from when on rays are sent.
         arrays: those of the mesh's vertices, by the names of the fields.
         device: where it is read.
@@ -100,12 +100,14 @@ def look_of(
     Raises:
         InputError: the scene gives a texture, and the mesh has no texture coordinates.
     """
-    if own.texture is not None and mesh.uvs is None:
+    if any(own.texture is not None for own in owns) and mesh.uvs is None:
         raise InputError("material.texture: the object has no texture coordinates (UVs)")
     look, pool, is_of_file = LookRecord(), TexturePool(), has_material(mesh)
-    looks = [overridden(part.material, own, is_of_file=is_of_file) for part in mesh.parts]
+    pairs = zip(mesh.parts, owns, strict=True)
+    looks = [overridden(part.material, own, is_of_file=is_of_file) for part, own in pairs]
     uv_sets = [mesh.uvs is not None, mesh.second_uvs is not None]
-    records = [_material_record(material, own, reflection, pool, uv_sets) for material in looks]
+    told = zip(looks, owns, strict=True)
+    records = [_material_record(material, own, reflection, pool, uv_sets) for material, own in told]
     look.materials = wp.array(records, dtype=MaterialRecord, device=device)
     pool.upload(look, device)
     for name, array in arrays.items():

@@ -48,7 +48,7 @@ def fill_records(
     """
     materials = [source.material for source in sources]
     albedo, mirror, emission = (_colors(materials, name) for name in ("albedo", "mirror", "emission"))
-    look_of = looks.numbers_of(materials, meshes, mesh_of)
+    look_of = looks.numbers_of(sources, meshes, mesh_of)
     albedo[_is_colored_by_file(materials, meshes, mesh_of)] = 1.0
     # An object that only glows needs no normals.
     is_lit = (np.maximum(albedo, mirror).max(axis=1, initial=0.0) > 0.0) | (look_of >= 0)

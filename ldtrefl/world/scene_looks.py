@@ -9,8 +9,7 @@ import numpy as np
 import warp as wp
 
 from ldtrefl.files.stored_picture import StoredPicture
-from ldtrefl.scene.description import Reflection
-from ldtrefl.scene.material import Material
+from ldtrefl.scene.description import Object, Reflection
 from ldtrefl.world.device_mesh import DeviceMesh
 from ldtrefl.world.look_records import LookRecord, Looks
 from ldtrefl.world.looks import Look
@@ -25,32 +24,31 @@ class SceneLooks:
         self.device = device
         self._reflection = reflection
         self._decoded = decoded
-        self._numbers: dict[tuple[DeviceMesh, object], int] = {}
+        self._numbers: dict[tuple[DeviceMesh, object, object], int] = {}
         self._looks: list[Look] = []
         self._struct: tuple[int, StoredPicture | None, Looks] | None = None
         """The number of looks and the environment's picture that it was made for, and what was made."""
 
-    def numbers_of(
-        self, materials: Sequence[Material], meshes: Sequence[DeviceMesh], mesh_of: np.ndarray
-    ) -> np.ndarray:
+    def numbers_of(self, sources: Sequence[Object], meshes: Sequence[DeviceMesh], mesh_of: np.ndarray) -> np.ndarray:
         """(n,) the number of each object's look, which is added if it is new; -1 for objects that need none.
 
         Args:
-            materials: what the scene says of each object.
+            sources: the objects as the scene has them.
             meshes: some meshes.
             mesh_of: (n,) the number of each object's mesh.
         """
-        numbers = np.full(len(materials), -1, np.int64)
+        numbers = np.full(len(sources), -1, np.int64)
         needs = np.array([mesh.needs_look for mesh in meshes], bool)[mesh_of]
-        needs |= np.fromiter(map(attrgetter("has_model"), materials), bool, len(materials))
+        needs |= np.fromiter(map(attrgetter("material.has_model"), sources), bool, len(sources))
+        needs |= np.fromiter(map(attrgetter("parts"), sources), bool, len(sources))
         for index in np.flatnonzero(needs).tolist():
-            numbers[index] = self._number_of(meshes[mesh_of[index]], materials[index])
+            numbers[index] = self._number_of(meshes[mesh_of[index]], sources[index])
         return numbers
 
-    def _number_of(self, mesh: DeviceMesh, material: Material) -> int:
-        key = (mesh, material.key)
+    def _number_of(self, mesh: DeviceMesh, source: Object) -> int:
+        key = (mesh, source.material.key, tuple((pattern, own.key) for pattern, own in source.parts.items()))
         if key not in self._numbers:
-            self._looks.append(mesh.look(material, self._reflection))
+            self._looks.append(mesh.look(source, self._reflection))
             self._numbers[key] = len(self._looks) - 1
         return self._numbers[key]
 

@@ -20,7 +20,8 @@ def room(folder: Path) -> Path:
         extensions={"KHR_lights_punctual": {"lights": [{"type": "point"}]}},
         cameras=[{"type": "perspective", "perspective": {"yfov": 0.5, "znear": 0.1}}],
     )
-    file.quad()
+    file.quad(material=0)
+    file.tree["materials"] = [{"name": "paint"}]
     file.tree["nodes"][0] |= {"name": "sheet", "translation": [0, 2, 0]}
     file.add("nodes", {"extensions": {"KHR_lights_punctual": {"light": 0}}})
     file.add("nodes", {"camera": 0, "translation": [0, 0, 9]})
@@ -71,3 +72,17 @@ def test_the_axis_of_a_camera_s_up() -> None:
 def test_what_is_wrong_is_named(tmp_path: Path, table: str, match: str) -> None:
     with pytest.raises(InputError, match=match):
         loaded(tmp_path, CAMERA + f"[[include]]\n{table}\n")
+
+
+def test_what_is_said_of_nodes_and_materials_counts(tmp_path: Path) -> None:
+    table = 'file = "room.glb"\nparts = { "she?t" = { mirror = 0.5 }, "paint" = { albedo = 0.25 } }'
+    scene = loaded(tmp_path, CAMERA + f"[[include]]\n{table}\n")
+    (sheet,) = scene.objects
+    assert sheet.material.mirror == (0.5, 0.5, 0.5) and sheet.is_reflector
+    assert sheet.material_of("paint").albedo == (0.25, 0.25, 0.25)
+    assert sheet.material_of("other") is sheet.material
+
+
+def test_a_name_of_nothing_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"include\[0\]: parts\.paper: unknown node or material 'paper'.*sheet"):
+        loaded(tmp_path, CAMERA + '[[include]]\nfile = "room.glb"\nparts = { paper = { mirror = 0.5 } }\n')

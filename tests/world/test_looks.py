@@ -66,6 +66,20 @@ def test_each_part_has_its_own_material() -> None:
     np.testing.assert_allclose(image[0, 0], [0.0, 1.0, 0.0], rtol=1e-6)
 
 
+def test_what_is_said_of_a_part_counts_in_its_place() -> None:
+    red = SurfaceMaterial(name="red paint", base_color=(1.0, 0.0, 0.0))
+    parts = (Part(0, red), Part(1, SurfaceMaterial(name="chrome", base_color=(0.0, 1.0, 0.0))))
+    told = {"c*": Material(albedo=(0.0, 0.5, 0.0), emission=(0.0, 0.0, 2.0)), "*": Material(albedo=0.0)}
+    for names, upper, lower in (
+        (("c*",), [0.0, 0.5, 2.0], [1.0, 0.0, 0.0]),
+        (("c*", "*"), [0.0, 0.5, 2.0], [0.0, 0.0, 0.0]),
+        ((), [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]),
+    ):
+        image = seen(Mesh(CORNERS, FACES, parts=parts), parts={name: told[name] for name in names})
+        np.testing.assert_allclose(image[0, 0], upper, atol=1e-6)
+        np.testing.assert_allclose(image[-1, -1], lower, atol=1e-6)
+
+
 def test_a_texture_of_the_scene_needs_texture_coordinates_and_one_of_a_file_does_without() -> None:
     textured = replace(GLTF, base_texture=Texture(PICTURE))
     np.testing.assert_allclose(seen(square(textured, None))[0, 0], [1.5, 2.25, 4.0], rtol=1e-6)
