@@ -1,4 +1,4 @@
-"""Faces whose corners have more than their vertices: a vertex is doubled for each set of values that it is given."""
+"""Faces by their corners: cut into triangles, and with a vertex doubled for each set of values that it is given."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from ldtrefl.base import budget
+from ldtrefl.base.errors import InputError
 from ldtrefl.scene.piece import Piece
+from ldtrefl.scene.readers.polygons import triangles_of
 from ldtrefl.scene.welding import first_of_equals
 
 CUTTING_BYTES = 250.0
@@ -25,6 +27,47 @@ def take_for_triangles(sizes: np.ndarray) -> None:
     """
     count = int(np.maximum(sizes.astype(np.int64) - 2, 0).sum())
     budget.take(CUTTING_BYTES * count, f"{count} triangles")
+
+
+def check_vertices(corners: np.ndarray, sizes: np.ndarray, count: int) -> None:
+    """Refuse faces of vertices that there are not.
+
+    Args:
+        corners: (corners,) vertex numbers, face by face.
+        sizes: (faces,) corners of each.
+        count: how many vertices there are.
+
+    Raises:
+        InputError: naming the first such face.
+    """
+    if len(corners) and (int(corners.min()) < 0 or int(corners.max()) >= count):
+        wrong = int(np.argmax((corners < 0) | (corners >= count)))
+        face = int(np.searchsorted(np.cumsum(sizes), wrong, side="right"))
+        raise InputError(f"face {face} has vertex {corners[wrong]}, allowed are 0 to {count - 1}")
+
+
+def cut_faces(points: np.ndarray, corners: np.ndarray, sizes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Cut faces into triangles; those of fewer than three corners have none.
+
+    Args:
+        points: (vertices, 3).
+        corners: (corners,) vertex numbers, face by face.
+        sizes: (faces,) corners of each.
+
+    Returns:
+        (m, 3) numbers of corners, and (m,) the face that each triangle is of.
+
+    Raises:
+        InputError: polygons that are not convex have too many corners.
+    """
+    if (sizes == 3).all():
+        return np.arange(len(corners)).reshape(-1, 3), np.arange(len(sizes))
+    is_polygon = sizes >= 3
+    kept, counts = np.flatnonzero(np.repeat(is_polygon, sizes)), sizes[is_polygon].astype(np.int64)
+    of_face = np.repeat(np.flatnonzero(is_polygon), counts - 2)
+    if not len(kept):
+        return np.zeros((0, 3), np.int64), of_face
+    return kept[triangles_of(points[corners[kept]], counts)], of_face
 
 
 def split_corners(faces: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

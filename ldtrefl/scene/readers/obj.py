@@ -15,11 +15,10 @@ from ldtrefl.base import budget
 from ldtrefl.base.errors import InputError
 from ldtrefl.files.srgb import linear_from_srgb
 from ldtrefl.scene.piece import Piece, unit_vectors
-from ldtrefl.scene.readers.corner_tables import split_corners, take_for_triangles
+from ldtrefl.scene.readers.corner_tables import cut_faces, split_corners, take_for_triangles
 from ldtrefl.scene.readers.mtl import MaterialLibrary
 from ldtrefl.scene.readers.obj_text import ObjTables, read_tables
 from ldtrefl.scene.readers.pictures import Beside, Pictures, file_beside
-from ldtrefl.scene.readers.polygons import triangles_of
 from ldtrefl.scene.surface_material import PLAIN, SurfaceMaterial, Texture
 
 WITH_NORMALS = 1 << 30
@@ -85,18 +84,12 @@ def _check(tables: ObjTables, notes: list[str]) -> None:
 
 def _triangles(tables: ObjTables, notes: list[str]) -> tuple[np.ndarray, np.ndarray]:
     """((m, 3) numbers of corners, (m,) number of the face) of the triangles that faces are cut into."""
-    sizes = tables.sizes
-    if (sizes == 3).all():
-        return np.arange(len(tables.corners)).reshape(-1, 3), np.arange(len(sizes))
-    is_polygon = sizes >= 3
-    if not is_polygon.all():
-        notes.append(f"{int((~is_polygon).sum())} faces of fewer than three corners")
-    corners = np.flatnonzero(np.repeat(is_polygon, sizes))
-    if not len(corners):
+    if (tables.sizes < 3).any():
+        notes.append(f"{int((tables.sizes < 3).sum())} faces of fewer than three corners")
+    cut, of_face = cut_faces(tables.positions, tables.corners[:, 0], tables.sizes)
+    if not len(cut):
         raise InputError("the mesh has no triangles: every face has fewer than three corners")
-    sizes = sizes[is_polygon].astype(np.int64)
-    cut = triangles_of(tables.positions[tables.corners[corners, 0]], sizes)
-    return corners[cut], np.repeat(np.flatnonzero(is_polygon), sizes - 2)
+    return cut, of_face
 
 
 def _split(

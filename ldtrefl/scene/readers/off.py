@@ -16,8 +16,13 @@ from ldtrefl.base import budget
 from ldtrefl.base.errors import InputError
 from ldtrefl.files.srgb import linear_from_srgb
 from ldtrefl.scene.piece import Piece, unit_vectors
-from ldtrefl.scene.readers.corner_tables import split_corners, take_for_triangles, with_vertices
-from ldtrefl.scene.readers.polygons import triangles_of
+from ldtrefl.scene.readers.corner_tables import (
+    check_vertices,
+    cut_faces,
+    split_corners,
+    take_for_triangles,
+    with_vertices,
+)
 from ldtrefl.scene.readers.text_numbers import Lines
 
 WORD = re.compile(rb"(ST)?(C)?(N)?(4)?(n)?OFF\b")
@@ -57,18 +62,12 @@ def _read(data: bytes) -> tuple[list[Piece], list[str]]:
     points, normals, colors, uvs = _of_vertices(vertices, letters)
     values, words = lines.rows(_some(lines, 1 + vertex_count, face_count), 0, least=1)
     corners, sizes, face_colors, notes = _of_faces(values, words)
-    if len(corners) and (int(corners.min()) < 0 or int(corners.max()) >= vertex_count):
-        wrong = int(np.argmax((corners < 0) | (corners >= vertex_count)))
-        face = int(np.searchsorted(np.cumsum(sizes), wrong, side="right"))
-        raise InputError(f"face {face} has vertex {corners[wrong]}, allowed are 0 to {vertex_count - 1}")
+    check_vertices(corners, sizes, vertex_count)
     take_for_triangles(sizes)
-    is_polygon = sizes >= 3
-    kept = np.flatnonzero(np.repeat(is_polygon, sizes))
-    if not len(kept):
+    cut, of_face = cut_faces(points, corners, sizes)
+    if not len(cut):
         raise InputError("the mesh has no triangles")
-    cut = kept[triangles_of(points[corners[kept]], sizes[is_polygon])]
     piece = Piece(points, corners[cut], normals, uvs, colors=colors)
-    of_face = np.repeat(np.flatnonzero(is_polygon), sizes[is_polygon] - 2)
     if colors is None and face_colors is not None:
         piece = _with_face_colors(piece, np.repeat(face_colors[of_face], 3, axis=0))
     return [piece], notes

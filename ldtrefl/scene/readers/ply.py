@@ -14,10 +14,15 @@ from ldtrefl.base import budget
 from ldtrefl.base.errors import InputError
 from ldtrefl.files.srgb import linear_from_srgb
 from ldtrefl.scene.piece import Piece, unit_vectors
-from ldtrefl.scene.readers.corner_tables import split_corners, take_for_triangles, with_vertices
+from ldtrefl.scene.readers.corner_tables import (
+    check_vertices,
+    cut_faces,
+    split_corners,
+    take_for_triangles,
+    with_vertices,
+)
 from ldtrefl.scene.readers.pictures import Beside, Pictures
 from ldtrefl.scene.readers.ply_tables import Table, read_header, read_tables
-from ldtrefl.scene.readers.polygons import triangles_of
 from ldtrefl.scene.surface_material import PLAIN, SurfaceMaterial, Texture
 
 CORNERS = ("vertex_indices", "vertex_index")
@@ -56,21 +61,15 @@ def _pieces_of(tables: dict[str, Table], looks: list[SurfaceMaterial], notes: li
     points = _joined(vertices, POSITION)
     seen: dict[str, set[str]] = {"vertex": {*POSITION}, "face": set()}
     corners, sizes = _faces(tables, seen)
-    if len(corners) and (int(corners.min()) < 0 or int(corners.max()) >= len(points)):
-        corner = int(np.argmax((corners < 0) | (corners >= len(points))))
-        face = int(np.searchsorted(np.cumsum(sizes), corner, side="right"))
-        raise InputError(f"face {face} has vertex {corners[corner]}, allowed are 0 to {len(points) - 1}")
+    check_vertices(corners, sizes, len(points))
     take_for_triangles(sizes)
-    is_polygon = sizes >= 3
-    kept = np.flatnonzero(np.repeat(is_polygon, sizes))
-    if not len(kept):
+    cut, of_face = cut_faces(points, corners, sizes)
+    if not len(cut):
         raise InputError("the mesh has no triangles: it is a cloud of points, or its table of faces is empty")
-    cut = kept[triangles_of(points[corners[kept]], sizes[is_polygon])]
-    of_face = np.repeat(np.flatnonzero(is_polygon), sizes[is_polygon] - 2)
     piece = Piece(points, corners[cut], None, None)
     piece = _with_vertex_values(piece, vertices, seen["vertex"])
-    if not is_polygon.all():
-        notes.append(f"{int((~is_polygon).sum())} faces of fewer than three corners")
+    if (sizes < 3).any():
+        notes.append(f"{int((sizes < 3).sum())} faces of fewer than three corners")
     faces = tables.get("face")
     if faces is not None:
         piece = _with_corner_values(piece, faces, cut, of_face, sizes, seen["face"])
