@@ -7,12 +7,10 @@ import numpy as np
 from ldtrefl.base import budget
 from ldtrefl.base.errors import InputError
 from ldtrefl.scene.gltf.container import Document, Table
+from ldtrefl.scene.gltf.meshopt import EXTRA
 
 BYTES_PER_BYTE = 120.0
 """Bytes that unpacking takes for a packed byte: the best that Draco packs are flat grids, two bits a vertex."""
-
-EXTRA = "pip install 'ldtrefl[gltf]'"
-"""What installs the readers of compressed geometry."""
 
 
 def draco_attributes(document: Document, compressed: Table, attributes: Table, where: str) -> dict[str, np.ndarray]:

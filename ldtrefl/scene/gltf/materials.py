@@ -20,10 +20,10 @@ from ldtrefl.scene.surface_material import IDENTITY, PLAIN, SurfaceMaterial, Tex
 BYTES_A_PIXEL = 12
 """What it takes to unpack a picture and what is kept of it."""
 
-WRAPS: dict[int, Wrap] = {10497: "repeat", 33071: "clamp", 33648: "mirror"}
-NEAREST = (9728, 9984, 9986)
-"""Filters of samplers that take the nearest texel."""
+NEAREST = 9728
+"""The filter that takes the nearest texel."""
 
+WRAPS: dict[int, Wrap] = {10497: "repeat", 33071: "clamp", 33648: "mirror"}
 IMAGE_SOURCES = ("EXT_texture_webp",)
 """Extensions of textures that name another picture, which is taken."""
 
@@ -141,7 +141,7 @@ class Materials:
             picture,
             uv_set=uv_set,
             wrap=(wrap_u, wrap_v),
-            is_nearest=sampler.get("magFilter") == 9728,
+            is_nearest=sampler.get("magFilter") == NEAREST,
             transform=transform,
             is_data=is_data,
         )

@@ -58,11 +58,6 @@ def nodes_of_scene(document: Document) -> list[Node]:
     return found
 
 
-def world_matrices(document: Document) -> dict[int, np.ndarray]:
-    """(4, 4) float64 of every node that stands in the scene, by its number."""
-    return {node.number: node.matrix for node in nodes_of_scene(document)}
-
-
 def _roots(document: Document, entries: list[Table]) -> Iterator[tuple[Any, str]]:
     """(number, what refers to it) of the nodes that stand in no other."""
     scenes = document.entries("scenes")

@@ -34,9 +34,6 @@ PIXELS = 768 * 512
 OBJECT_BYTES = 8 << 10
 """An object of a scene, without its mesh and pictures: what Python and the device keep of it."""
 
-FAR = 1.0
-"""How far before its eye a camera looks, in the file's unit: where, is all the same."""
-
 WIDEST = 64.0
 """Width over height, or height over width, of an image at most."""
 
@@ -182,7 +179,7 @@ class _Builder:
             aspect = min(max(node.aspect, 1.0 / WIDEST), WIDEST)
             height = round(math.sqrt(PIXELS / aspect))
             size = {"width": round(height * aspect), "height": height}
-        reach = FAR * max(1.0, float(np.abs(eye).max()))
+        reach = max(1.0, float(np.abs(eye).max()))  # how far it looks is all the same
         return Camera(eye=_three(eye), look_at=_three(eye + reach * forward), up=_three(up), fov_y=node.fov_y, **size)
 
 
