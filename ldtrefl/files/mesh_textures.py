@@ -1,10 +1,11 @@
-"""Textures of mesh files: Pillow pictures, as the readers of meshes open them -> stored pictures.
+"""Textures of mesh files: picture files, or Pillow pictures as trimesh opens them -> stored pictures.
 
 A stored picture is explained in ``stored_picture.py``.
 """
 
 from __future__ import annotations
 
+import io
 import weakref
 from collections.abc import Iterable
 
@@ -13,6 +14,7 @@ from PIL import Image
 
 from ldtrefl.base import budget
 from ldtrefl.base.errors import InputError
+from ldtrefl.files.pillow_limit import no_pixel_limit
 from ldtrefl.files.srgb import linear_from_srgb
 from ldtrefl.files.stored_picture import StoredPicture
 
@@ -21,6 +23,9 @@ BYTES_A_PIXEL = 4 + 4 + 3
 
 WITH_ALPHA = ("RGBA", "LA", "PA", "RGBa", "La")
 """Pillow's modes of pictures with alpha."""
+
+UNPACKED_BYTES_A_PIXEL = 12
+"""What it takes to unpack a picture file, and what is kept of it."""
 
 ROWS_AT_ONCE = 256
 """Rows of a picture that are converted at a time."""
@@ -76,3 +81,21 @@ def stored_texture(picture: Image.Image, *, with_alpha: bool = False) -> StoredP
         raise InputError(f"a texture is cut off or damaged ({error})") from error
     made = StoredPicture(stored, alpha)
     return _shared.setdefault(made.key, made)
+
+
+def unpacked_picture(data: bytes, *, with_alpha: bool) -> StoredPicture:
+    """A picture file (PNG, JPEG, WebP) as a stored picture.
+
+    Raises:
+        InputError: it is of another kind, damaged, or larger than is allowed.
+    """
+    with no_pixel_limit():
+        try:
+            picture = Image.open(io.BytesIO(data))
+        except Exception as error:  # whatever a damaged picture provokes in a reader is the picture's fault
+            raise InputError("not a picture that can be read (PNG, JPEG or WebP)") from error
+        width, height = picture.size
+        budget.take(
+            UNPACKED_BYTES_A_PIXEL * width * height, f"a texture of {width} x {height} pixels", "a smaller texture"
+        )
+        return stored_texture(picture, with_alpha=with_alpha)

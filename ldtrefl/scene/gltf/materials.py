@@ -2,23 +2,16 @@
 
 from __future__ import annotations
 
-import io
 import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from PIL import Image
 
-from ldtrefl.base import budget
 from ldtrefl.base.errors import InputError
-from ldtrefl.files.mesh_textures import stored_texture
-from ldtrefl.files.pillow_limit import no_pixel_limit
+from ldtrefl.files.mesh_textures import unpacked_picture
 from ldtrefl.files.stored_picture import StoredPicture
 from ldtrefl.scene.gltf.container import Document, Table
 from ldtrefl.scene.surface_material import IDENTITY, PLAIN, SurfaceMaterial, Texture, Wrap
-
-BYTES_A_PIXEL = 12
-"""What it takes to unpack a picture and what is kept of it."""
 
 NEAREST = 9728
 """The filter that takes the nearest texel."""
@@ -168,22 +161,6 @@ class Materials:
         if image.get("bufferView") is not None:
             return bytes(self.document.view(image["bufferView"], f"{where}.bufferView"))
         return self.document.file(image.get("uri"), f"{where}.uri")
-
-
-def unpacked_picture(data: bytes, *, with_alpha: bool) -> StoredPicture:
-    """A picture file (PNG, JPEG, WebP) as a stored picture.
-
-    Raises:
-        InputError: it is of another kind, damaged, or larger than is allowed.
-    """
-    with no_pixel_limit():
-        try:
-            picture = Image.open(io.BytesIO(data))
-        except Exception as error:  # whatever a damaged picture provokes in a reader is the picture's fault
-            raise InputError("not a picture that can be read (PNG, JPEG or WebP)") from error
-        width, height = picture.size
-        budget.take(BYTES_A_PIXEL * width * height, f"a texture of {width} x {height} pixels", "a smaller texture")
-        return stored_texture(picture, with_alpha=with_alpha)
 
 
 def _wrap(sampler: Table, key: str, where: str) -> Wrap:

@@ -10,9 +10,9 @@ import numpy as np
 from PIL import Image
 
 from ldtrefl.base.errors import InputError
+from ldtrefl.files.mesh_textures import unpacked_picture
 from ldtrefl.files.srgb import srgb_from_linear
 from ldtrefl.files.stored_picture import StoredPicture
-from ldtrefl.scene.gltf.materials import unpacked_picture
 
 Beside = Callable[[str], bytes]
 """The bytes of a file by the name that the mesh file has for it."""
