@@ -26,7 +26,7 @@ from ldtrefl.scene.material import Material
 from ldtrefl.scene.mesh import Mesh
 from ldtrefl.scene.mesh_scene import mesh_scene
 from ldtrefl.scene.places import split_places, standing_in
-from ldtrefl.scene.scene_parts import SceneParts
+from ldtrefl.scene.scene_parts import OBJECT_BYTES, SceneParts
 from ldtrefl.scene.shared_geometries import SharedGeometries
 from ldtrefl.scene.standing import on_the_floor, split_standing
 from ldtrefl.scene.toml_text import read_toml
@@ -35,9 +35,6 @@ MESH_PATH_VARIABLE = "LDTREFL_MESH_PATH"
 
 SCENE_ENDINGS = (".toml", "")
 """Of the names of scene files. All others are taken for mesh files."""
-
-OBJECT_BYTES = 8 << 10
-"""An object of a scene, without its mesh and pictures: what Python and the device keep of it."""
 
 Result = TypeVar("Result")
 

@@ -11,6 +11,9 @@ import numpy as np
 from ldtrefl.scene.decomposition import placed
 from ldtrefl.scene.description import Camera, Light, Object
 
+OBJECT_BYTES = 8 << 10
+"""An object of a scene, without its mesh and pictures: what Python and the device keep of it."""
+
 
 @dataclass(frozen=True, eq=False)
 class SceneParts:

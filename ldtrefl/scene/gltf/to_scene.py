@@ -26,13 +26,10 @@ from ldtrefl.scene.gltf.pieces import pieces_of
 from ldtrefl.scene.joining import joined_mesh, joining_bytes
 from ldtrefl.scene.mesh import Mesh
 from ldtrefl.scene.readers.archives import mesh_files
-from ldtrefl.scene.scene_parts import SceneParts
+from ldtrefl.scene.scene_parts import OBJECT_BYTES, SceneParts
 
 PIXELS = 768 * 512
 """Of an image whose camera says how wide it is for its height."""
-
-OBJECT_BYTES = 8 << 10
-"""An object of a scene, without its mesh and pictures: what Python and the device keep of it."""
 
 WIDEST = 64.0
 """Width over height, or height over width, of an image at most."""
