@@ -20,8 +20,9 @@ from typing import Any
 
 from mitsuba_parts.emission_only import emission_only
 from mitsuba_parts.judge import MOST_OFF, OFF, Judgement, judgement
-from mitsuba_parts.mirror_paths import SMALL_LIFT, MitsubaPictures
+from mitsuba_parts.mirror_paths import MitsubaPictures
 from mitsuba_parts.mitsuba_scene import ENVIRONMENT_ROWS, VARIANT, mitsuba
+from mitsuba_parts.pixel_rays import SMALL_LIFT
 
 import ldtrefl
 from ldtrefl.base.errors import InputError

@@ -14,7 +14,8 @@ import pytest
 from mitsuba_comparison import table
 from mitsuba_parts.emission_only import emission_only
 from mitsuba_parts.judge import Judgement, judgement
-from mitsuba_parts.mirror_paths import SMALL_LIFT, MirrorPaths, MitsubaPictures
+from mitsuba_parts.mirror_paths import MirrorPaths, MitsubaPictures
+from mitsuba_parts.pixel_rays import SMALL_LIFT
 from picture_edges import near_edge
 
 import ldtrefl

@@ -7,19 +7,14 @@ same; the comparison's table says by how much they differ.
 
 from __future__ import annotations
 
-import importlib
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from ldtrefl.scene.description import Scene
 
-from .mitsuba_scene import mitsuba, mitsuba_scene
-
-SMALL_LIFT = 1e-6
-"""How far above a surface its reflected rays start, over 1 + their largest coordinate, as Mitsuba counts: 16 roundings
-of float32. Its own 9e-5 move what mirrors show by up to a texel of a texture near by."""
+from .mitsuba_scene import mitsuba_scene
+from .pixel_rays import PixelRays
 
 NO_ROULETTE = 1000
 """Depth of a path from which on Mitsuba ends some by chance: none is as deep."""
@@ -41,7 +36,7 @@ class MirrorPaths:
     """(h, w) bool: at a bounce the shading normal sends the path to the other side of the triangle that it came to."""
 
 
-class MitsubaPictures:
+class MitsubaPictures(PixelRays):
     """Renders an emission-only scene by Mitsuba.
 
     Raises:
@@ -49,9 +44,7 @@ class MitsubaPictures:
     """
 
     def __init__(self, scene: Scene) -> None:
-        self._size = scene.camera.width, scene.camera.height
-        self._scene = mitsuba_scene(scene)
-        self._mi, self._dr = mitsuba(), importlib.import_module("drjit")
+        super().__init__(scene, mitsuba_scene(scene))
 
     def by_path_integrator(self, bounces: int) -> np.ndarray:
         """(h, w, 3) float32: the picture by Mitsuba's ``path`` integrator."""
@@ -83,27 +76,6 @@ class MitsubaPictures:
             leaves_below |= active & (dr.dot(onwards, met.n) * dr.dot(ray.d, met.n) >= 0.0)
             ray = met.spawn_ray(onwards) if lift is None else self._lifted_ray(met, onwards, lift)
             dr.eval(ray, active, radiance, throughput, leaves_below, mirrors)
-        on_miss = dr.zeros(mi.SurfaceInteraction3f)
-        on_miss.wi = -ray.d
-        beyond = dr.select(active, throughput * scene.environment().eval(on_miss), 0.0)
+        beyond = dr.select(active, throughput * self._beyond(ray), 0.0)
         pictures = [self._picture(values) for values in (radiance, beyond, mirrors, leaves_below)]
         return MirrorPaths(np.stack(surfaces, axis=-1), *pictures)
-
-    def _camera_rays(self) -> Any:
-        mi, (width, height) = self._mi, self._size
-        pixel = self._dr.arange(mi.UInt32, width * height)
-        x, y = mi.Float(pixel % width) + 0.5, mi.Float(pixel // width) + 0.5
-        middle = mi.Point2f(0.5)
-        return self._scene.sensors()[0].sample_ray(0.0, 0.5, mi.Point2f(x / width, y / height), middle)[0]
-
-    def _lifted_ray(self, met: Any, direction: Any, lift: float) -> Any:
-        """A ray that starts at ``lift``, on the side of the triangle that it goes to."""
-        dr = self._dr
-        height = dr.mulsign(lift * (1.0 + dr.max(dr.abs(met.p))), dr.dot(met.n, direction))
-        return self._mi.Ray3f(met.p + height * met.n, direction)
-
-    def _picture(self, values: Any) -> np.ndarray:
-        """(h, w) or (h, w, 3) of an array of all pixels."""
-        width, height = self._size
-        array = np.array(values)
-        return array.T.reshape(height, width, *array.shape[:-1])

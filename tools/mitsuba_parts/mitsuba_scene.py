@@ -1,14 +1,16 @@
-"""An emission-only scene in Mitsuba 3: the same triangles and vertex normals, Mitsuba's own mirrors and environment.
+"""A scene in Mitsuba 3: the same triangles and vertex normals, Mitsuba's own surfaces, lights and environment.
 
 Vertices and normals are those of our meshes, moved into the world in float64. All else is Mitsuba's: it builds its
 tree, interpolates normals, filters textures, decodes sRGB and looks up the environment, a picture of it that is fine
-enough for the blend from ground to sky. Only the emitter is made here: Mitsuba's ``area`` shines to one side.
+enough for the blend from ground to sky. Emission-only scenes have no lights, and one emitter that is made here:
+Mitsuba's ``area`` shines to one side.
 """
 
 from __future__ import annotations
 
 import functools
 import importlib
+from collections.abc import Callable
 from types import ModuleType
 from typing import Any
 
@@ -16,7 +18,8 @@ import numpy as np
 
 from ldtrefl.base.errors import InputError
 from ldtrefl.files.stored_picture import StoredPicture
-from ldtrefl.scene.description import Camera, Environment, Object, Scene
+from ldtrefl.scene.description import Camera, Environment, Light, Object, Scene
+from ldtrefl.scene.mesh import Part
 from ldtrefl.world.camera import unit_up
 
 VARIANT = "llvm_ad_rgb"
@@ -80,10 +83,29 @@ def _two_sided_area(mi: Any, dr: Any) -> Any:
 
 
 def mitsuba_scene(scene: Scene, variant: str = VARIANT, emitter: str = TWO_SIDED) -> Any:
-    """Mitsuba's scene: a mesh for each part of each object, which ``emitter`` lets shine."""
+    """Mitsuba's scene: a mesh for each part of each object, which ``emitter`` lets shine; without any lights."""
     mi = mitsuba(variant)
-    meshes = [mesh for entry in scene.objects for mesh in _meshes_of(mi, entry, emitter)]
-    named = {f"mesh_{i}": mesh for i, mesh in enumerate(meshes)}
+    return _loaded_scene(mi, scene, lambda entry, part: _shining(mi, entry, part, emitter), {})
+
+
+def lit_mitsuba_scene(scene: Scene, surface: Callable[[Object, Part], object]) -> Any:
+    """Mitsuba's scene with lights: a mesh for each part of each object, whose BSDF ``surface`` makes."""
+    mi = mitsuba()
+
+    def properties_of(entry: Object, part: Part) -> Any:
+        properties = mi.Properties()
+        properties["bsdf"] = surface(entry, part)
+        return properties
+
+    lights = {f"light_{i}": _light(light) for i, light in enumerate(scene.lights)}
+    return _loaded_scene(mi, scene, properties_of, lights)
+
+
+def _loaded_scene(
+    mi: Any, scene: Scene, properties_of: Callable[[Object, Part], Any], lights: dict[str, dict[str, object]]
+) -> Any:
+    meshes = [mesh for entry in scene.objects for mesh in _meshes_of(mi, entry, properties_of)]
+    named = {f"mesh_{i}": mesh for i, mesh in enumerate(meshes)} | lights
     camera, environment = _camera(mi, scene.camera), _environment(mi, scene.environment, unit_up(scene.camera))
     # Mitsuba would join meshes into one, which has then a single number.
     return mi.load_dict({"type": "scene", "camera": camera, "environment": environment, **named}, optimize=False)
@@ -129,26 +151,44 @@ def _environment(mi: Any, environment: Environment, up: np.ndarray) -> dict[str,
     return {"type": "envmap", "bitmap": mi.Bitmap(picture), "to_world": mi.ScalarTransform4f(to_world)}
 
 
-def _meshes_of(mi: Any, entry: Object, emitter: str) -> list[Any]:
+def _light(light: Light) -> dict[str, object]:
+    """A light. Ours says what leaves a white diffuse surface, which is the light that arrives over pi."""
+    if light.position is not None and light.intensity is not None:
+        intensity = {"type": "rgb", "value": np.multiply(np.pi, light.intensity).tolist()}
+        return {"type": "point", "position": list(light.position), "intensity": intensity}
+    assert light.direction is not None and light.radiance is not None
+    irradiance = {"type": "rgb", "value": np.multiply(np.pi, light.radiance).tolist()}
+    return {"type": "directional", "direction": list(light.direction), "irradiance": irradiance}
+
+
+def _meshes_of(mi: Any, entry: Object, properties_of: Callable[[Object, Part], Any]) -> list[Any]:
     """An object's parts."""
-    mesh, material = entry.geometry, entry.material
+    mesh = entry.geometry
     place = entry.world_from_object()
     vertices = mesh.vertices @ place[:3, :3].T + place[:3, 3]
     # Mitsuba normalises what it has interpolated, as ours does: lengths are kept.
     normals = mesh.normals @ np.linalg.inv(place[:3, :3]) if entry.smooth else None
-    made = []
     firsts = [part.first_triangle for part in mesh.parts]
-    for part, first, end in zip(mesh.parts, firsts, [*firsts[1:], len(mesh.faces)], strict=True):
-        properties = mi.Properties()
-        properties["bsdf"] = mi.load_dict(_bsdf(entry))
-        texture = part.material.base_texture
-        picture = texture.picture if entry.texture is None and texture is not None else entry.texture
-        color = np.multiply(material.albedo, part.material.base_color)
-        properties["emitter"] = mi.load_dict(
-            {"type": emitter, "radiance": _radiance(mi, color, np.asarray(material.emission), picture)}
-        )
-        made.append(_mesh(mi, vertices, mesh.faces[first:end], normals, mesh.uvs, properties))
-    return made
+    return [
+        _mesh(mi, vertices, mesh.faces[first:end], normals, mesh.uvs, properties_of(entry, part))
+        for part, first, end in zip(mesh.parts, firsts, [*firsts[1:], len(mesh.faces)], strict=True)
+    ]
+
+
+def _shining(mi: Any, entry: Object, part: Part, emitter: str) -> Any:
+    """What a part radiates and mirrors."""
+    properties = mi.Properties()
+    properties["bsdf"] = mi.load_dict(_bsdf(entry))
+    emission = np.asarray(entry.material.emission)
+    properties["emitter"] = mi.load_dict({"type": emitter, "radiance": colored(mi, *base_of(entry, part), emission)})
+    return properties
+
+
+def base_of(entry: Object, part: Part) -> tuple[np.ndarray, StoredPicture | None]:
+    """(3,) linear colour of a part, and the picture that it is times."""
+    texture = part.material.base_texture
+    picture = texture.picture if entry.texture is None and texture is not None else entry.texture
+    return np.multiply(entry.material.albedo, part.material.base_color), picture
 
 
 def _bsdf(entry: Object) -> dict[str, object]:
@@ -157,16 +197,16 @@ def _bsdf(entry: Object) -> dict[str, object]:
     return {"type": "twosided", "bsdf": {"type": "conductor", "material": "none", "specular_reflectance": mirror}}
 
 
-def _radiance(mi: Any, color: np.ndarray, emission: np.ndarray, picture: StoredPicture | None) -> dict[str, object]:
-    """``emission + color * picture``, a texture where there is a picture."""
+def colored(mi: ModuleType, color: np.ndarray, picture: StoredPicture | None, added: np.ndarray) -> dict[str, object]:
+    """``added + color * picture``, a texture where there is a picture."""
     if picture is None:
-        return {"type": "rgb", "value": (emission + color).tolist()}
-    values = (emission + color * _linear(mi, picture)).astype(np.float32)
+        return {"type": "rgb", "value": (added + color).tolist()}
+    values = (added + color * _linear(mi, picture)).astype(np.float32)
     texture = {"type": "bitmap", "data": mi.TensorXf(values), "raw": True}
     return {**texture, "filter_type": "bilinear", "wrap_mode": "repeat"}
 
 
-def _linear(mi: Any, picture: StoredPicture) -> np.ndarray:
+def _linear(mi: ModuleType, picture: StoredPicture) -> np.ndarray:
     """(h, w, 3) float32 linear pixels, decoded by Mitsuba."""
     if picture.pixels.dtype != np.uint8:
         return picture.pixels
