@@ -16,11 +16,11 @@ import numpy as np
 
 from ldtrefl.base.notices import warn_once
 from ldtrefl.device.stats import Stats
-from ldtrefl.ldt.linear.closed_check import is_closed
 from ldtrefl.ldt.options import DEFAULT_RESOLUTION, LinearSteps, Quality
 from ldtrefl.ldt.peel import peel_mesh
 from ldtrefl.ldt.searches import TRACERS
 from ldtrefl.ldt.texture import LayeredDepthTexture
+from ldtrefl.scene.closed_check import is_closed
 from ldtrefl.tracing.tracer import BoundTracer, array_of_shared_views
 from ldtrefl.world.device_mesh import DeviceMesh
 from ldtrefl.world.device_scene import DeviceScene

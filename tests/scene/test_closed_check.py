@@ -5,8 +5,7 @@ import pytest
 import warp as wp
 
 import ldtrefl
-from ldtrefl.ldt.linear import closed_check
-from ldtrefl.scene import shapes
+from ldtrefl.scene import closed_check, shapes
 
 SPHERE = shapes.make("sphere", {"segments": [48, 24]})
 BOX = shapes.make("box")

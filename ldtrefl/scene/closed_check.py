@@ -1,4 +1,4 @@
-"""Whether a mesh is closed and wound one way: others have no inside for the paper's search."""
+"""Whether a mesh is closed and wound one way: others have no inside."""
 
 from __future__ import annotations
 
