@@ -67,11 +67,12 @@ def _materials(asset: Asset) -> Iterator[str | Table]:
     entries = asset.document.entries("materials")
     if not entries:
         return
-    table = Table("material", "base colour", "metallic", "roughness", "alpha", "textures")
+    table = Table("material", "base colour", "metallic", "roughness", "alpha", "sides", "textures")
     for number in range(min(len(entries), MOST_ROWS)):
         made = asset.materials.material(number)
         row = (printable(made.name or str(number)), _numbers(made.base_color), f"{made.metallic:.3g}")
-        table.add_row(*row, f"{made.roughness:.3g}", made.alpha_mode, ", ".join(_textures(made)) or "none")
+        sides = "both" if made.double_sided else "front"
+        table.add_row(*row, f"{made.roughness:.3g}", made.alpha_mode, sides, ", ".join(_textures(made)) or "none")
     yield f"{len(entries)} materials"
     yield table
 

@@ -14,7 +14,7 @@ import warp as wp
 
 from ldtrefl.device import launch
 from ldtrefl.frame.drawn_objects import DrawnObjects
-from ldtrefl.frame.gbuffer import GBuffer, GBufferView
+from ldtrefl.frame.gbuffer import GBuffer, GBufferView, pixel_ray
 from ldtrefl.frame.pixel_box import BEHIND
 from ldtrefl.frame.pixel_order import BLOCK
 from ldtrefl.frame.projection import DrawnObject, corner_of, homogeneous
@@ -26,9 +26,10 @@ from ldtrefl.geometry.perspective_raster import (
     inverse_depth,
     perspective_weights,
 )
+from ldtrefl.geometry.vectors import as_single
 from ldtrefl.scene.description import Camera
-from ldtrefl.shading.surface import part_of
-from ldtrefl.world.camera import Band, camera_view, whole_image
+from ldtrefl.shading.surface import may_see_back, part_of
+from ldtrefl.world.camera import Band, CameraView, camera_view, whole_image
 from ldtrefl.world.device_scene import DeviceScene
 from ldtrefl.world.look_records import Looks
 from ldtrefl.world.records import ObjectRecord
@@ -93,6 +94,19 @@ def of_its_group(
     return found
 
 
+@wp.func
+def leads_on(
+    objects: wp.array(dtype=ObjectRecord), looks: Looks, index: int, triangle: int, camera: CameraView, pixel: int
+) -> int:
+    """1 if a ray may go on, mirrored or straight, from a triangle of an object with a look that a pixel of a band sees;
+    else 0."""
+    look, part = objects[index].look, part_of(objects, index, triangle)
+    if looks.records[look].materials[part].hides_back != 0:
+        if may_see_back(objects[index], triangle, as_single(wp.normalize(pixel_ray(camera, pixel)))):
+            return 1
+    return looks.records[look].materials[part].reflects
+
+
 @launch.kernel
 def resolve_pixels(
     first: int,
@@ -132,7 +146,7 @@ def resolve_pixels(
             seen.triangle[i] = triangle
             is_mirror = reflects
             if reflects == 2:
-                is_mirror = looks.records[objects[index].look].materials[part_of(objects, index, triangle)].reflects
+                is_mirror = leads_on(objects, looks, index, triangle, seen.camera, i)
             seen.reflector[i] = wp.where(is_mirror != 0, wp.uint8(1), wp.uint8(0))
         i += 1
 

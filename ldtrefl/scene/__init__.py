@@ -11,6 +11,7 @@
     normals.py          vertex normals, with welding.py, two_sided.py and winding.py
     outliers.py         the few triangles far outside a mesh's bulk
     convexity.py        whether rays that leave a mesh can come back to it
+    solid.py            whether backs of a mesh can be seen, with closed_check.py
     shapes/             procedural meshes, one a file
     readers/            mesh files in many formats
 

@@ -53,6 +53,9 @@ class Material:
     """As in glTF: 0 for a mirror, 1 for matt; beside ``mirror``, that of the mirror."""
     ior: Annotated[Real, Field(ge=1.0)] | None = None
     """Index of refraction: says how much reflects at normal incidence of what is no metal."""
+    double_sided: Flag | None = None
+    """Whether it is seen from behind, too. If it is not given, the mesh file says so, unless ``mirror`` takes the place
+    of its material; things without a material are seen from both sides."""
 
     def __post_init__(self) -> None:
         if isinstance(self.albedo, _NotGiven):
@@ -69,7 +72,8 @@ class Material:
         albedo = self.albedo if is_given(self.albedo) else None
         emission = self.emission if is_given(self.emission) else None
         texture = None if self.picture is None else self.picture.key
-        return albedo, texture, emission, self.mirror, self.fresnel, self.metallic, self.roughness, self.ior
+        model = self.metallic, self.roughness, self.ior
+        return albedo, texture, emission, self.mirror, self.fresnel, *model, self.double_sided
 
     @functools.cached_property
     def picture(self) -> StoredPicture | None:

@@ -18,6 +18,7 @@ from ldtrefl.scene.convexity import sides_with_returns
 from ldtrefl.scene.mesh_arrays import copied_faces, copied_vertices, fitted_vertices, is_immutable
 from ldtrefl.scene.normals import vertex_normals
 from ldtrefl.scene.outliers import split_outliers
+from ldtrefl.scene.solid import is_solid
 from ldtrefl.scene.surface_material import PLAIN, SurfaceMaterial
 
 MAX_TRIANGLES = 1 << 30
@@ -188,6 +189,11 @@ class Mesh:
         """From which sides of its triangles rays can come back to it (``convexity.py``); found when first asked for."""
         centre, half = self.unit_frame
         return sides_with_returns((self.vertices - centre) / half, self.faces)
+
+    @functools.cached_property
+    def is_solid(self) -> bool:
+        """Whether no triangle's back is seen from outside (``solid.py``); found when it is first asked for."""
+        return is_solid(self.vertices, self.faces)
 
 
 def _read_only(array: np.ndarray) -> np.ndarray:

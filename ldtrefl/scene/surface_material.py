@@ -69,6 +69,7 @@ class SurfaceMaterial:
     """Radiance."""
     emission_texture: Texture | None = None
     double_sided: bool = True
+    """Seen from behind, too; else what is seen there is not there, but for light, whose way it stands in."""
     ior: float = 1.5
     """KHR_materials_ior; 0 stands for infinity."""
     specular: float = 0.0

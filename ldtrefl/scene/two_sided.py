@@ -21,6 +21,9 @@ SMALLEST_SINE = wp.constant(wp.float64(1e-14))
 BYTES_PER_CANDIDATE = 300
 """Memory for each triangle that may have a mirror image, as measured."""
 
+SCATTER = np.uint64(0x9E3779B97F4A7C15)
+"""An odd number whose multiples are spread over all numbers of 64 bits."""
+
 BLOCK = 1 << 17
 """Corners whose sides are found at a time: memory stays small."""
 
@@ -79,6 +82,24 @@ def _sides_of(
     weighted = _weighted_normals(vertices[here], vertices[ahead], vertices[behind])
     total = np.stack([np.bincount(side, weights=weighted[:, axis]) for axis in range(3)], 1)
     return side, _unit(total).astype(np.float32)
+
+
+def triangles_with_image(places: np.ndarray) -> np.ndarray:
+    """(m,) bool: triangles whose three places another triangle has the other way round.
+
+    Args:
+        places: (m, 3) int32, the triangles' corners as places.
+
+    Raises:
+        InputError: it needs more memory than is allowed.
+    """
+    # Only triangles with the same three places, in any order, can be images: a sum tells most others apart.
+    with np.errstate(over="ignore"):
+        sums = (places.astype(np.uint64) * SCATTER ^ (places.astype(np.uint64) >> np.uint64(3))).sum(axis=1)
+    _, group, count = np.unique(sums, return_inverse=True, return_counts=True)
+    is_suspect = np.zeros(int(places.max()) + 1, bool)
+    is_suspect[places[count[group] > 1]] = True
+    return _has_mirror_image(places, is_suspect)
 
 
 def _has_mirror_image(places: np.ndarray, is_suspect: np.ndarray) -> np.ndarray:

@@ -1,7 +1,8 @@
 """What a look makes of a surface: its colours, its normal, and how it scatters light, in C++ (``finish.h``).
 
-The model is glTF's metallic-roughness. Surfaces are shaded from both sides, ``double_sided`` or not: to leave out a
-side would show the inside of what is meant to be solid through any hole, and rays come from everywhere.
+The model is glTF's metallic-roughness. What is cut out by alpha, or seen from behind of what is single-sided, is not
+there: rays go straight on. Shadows are those of both sides: what a surface keeps light from does not depend on its
+winding, and light does not come in through walls whose outsides are not modelled.
 """
 
 from __future__ import annotations
@@ -145,7 +146,9 @@ if (look.colors.shape[0])
         for (int c = 0; c < 3; ++c) mean += weight[c] * look.colors.data[(*face)[c]][i];
         (i < 3 ? (&base.x)[i] : alpha) *= mean;
     }
-const float coverage = Finishes::covered(material.alpha_mode, material.alpha_cutoff, alpha);
+float coverage = Finishes::covered(material.alpha_mode, material.alpha_cutoff, alpha);
+if (material.hides_back && surface.is_back && !(look.has_image.shape[0] && look.has_image.data[sighting.triangle]))
+    coverage = 0.0f;
 """
 BEND = """
 // Let the normal map bend the normal.
@@ -244,7 +247,7 @@ for (int part = 0; part < 3; ++part) {
 STORE = """
 auto& finish = finishes.data[0];
 finish.ambient = 1.0f + material.occlusion_strength * (texels[OCCLUSION].x - 1.0f);
-finish.normal = vec3(normal);
+finish.normal = coverage > 0.0f ? vec3(normal) : wp::vec3(0.0f);  // no light is asked for what is not there
 finish.coat_normal = vec3(smooth);
 finish.view = sighting.view;
 finish.low = material.has_highlights ? vec3(layers.low) : wp::vec3(0.0f);

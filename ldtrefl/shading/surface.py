@@ -23,6 +23,14 @@ FARTHEST_TURN = wp.constant(0.1)
 """Radians that a normal may turn beyond the triangle that it is known on. A smooth surface bends less over a patch."""
 
 
+EDGE_ON = wp.constant(1.0e-5)
+"""Cosine of a view with a facet's normal, in units of the largest entry of ``normal_from_unit``, below which rounding
+decides which side is seen."""
+
+AREA_ROUNDING = wp.constant(2.0e-6)
+"""Rounding of a triangle's normal, as a share of the product of two of its sides."""
+
+
 @wp.struct
 class Surface:
     """A point of a surface, ready to be shaded."""
@@ -94,6 +102,16 @@ def albedo_at(objects: wp.array(dtype=ObjectRecord), index: int, triangle: int, 
 
 
 @wp.func
+def may_see_back(record: ObjectRecord, triangle: int, view: wp.vec3) -> bool:
+    """Whether the back of a triangle is seen along a unit direction: true, too, where rounding decides."""
+    corners = record.faces[triangle]
+    a, b, c = record.vertices[corners[0]], record.vertices[corners[1]], record.vertices[corners[2]]
+    across = wp.cross(b - a, c - a)
+    rounding = EDGE_ON * wp.length(across) + AREA_ROUNDING * wp.length(b - a) * wp.length(c - a)
+    return wp.dot(record.normal_from_unit * across, view) >= -rounding
+
+
+@wp.func
 def way_onwards(surface: Surface, direction: wp.vec3) -> wp.vec3:
     """The unit direction in which a ray goes on that arrives along ``direction``: mirrored, or straight on."""
     if surface.goes_through != 0:
@@ -103,5 +121,8 @@ def way_onwards(surface: Surface, direction: wp.vec3) -> wp.vec3:
 
 @wp.func
 def may_return(record: ObjectRecord, surface: Surface) -> bool:
-    """Whether a ray that is mirrored by a surface may meet the object that it leaves."""
-    return ((record.returns >> surface.is_back) & 1) != 0
+    """Whether a ray that goes on from a surface may meet the object that it leaves."""
+    side = surface.is_back  # that it leaves
+    if surface.goes_through != 0:
+        side = 1 - side
+    return ((record.returns >> side) & 1) != 0

@@ -8,6 +8,7 @@
                         draw it many times
     triangle_numbers.py numbers that lead back to a triangle of any object
     appearance.py       colours and textures; lighting.py lights and environment
+    looks.py            materials of files; hidden_backs.py the sides of them that are not there
     camera.py           the camera as kernels see it
     unit_rays.py        rays in an object's own space
 

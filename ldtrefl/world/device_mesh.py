@@ -10,9 +10,13 @@ import warp as wp
 from ldtrefl.device import warp_abi
 from ldtrefl.files.stored_picture import StoredPicture
 from ldtrefl.scene.description import Object, Reflection
+from ldtrefl.scene.material import Material
 from ldtrefl.scene.mesh import Mesh
+from ldtrefl.scene.two_sided import triangles_with_image
+from ldtrefl.scene.welding import first_of_equals
 from ldtrefl.world.appearance import Appearance, appearance_of
 from ldtrefl.world.clusters import Clusters, clustered
+from ldtrefl.world.hidden_backs import hides_backs
 from ldtrefl.world.looks import Look, has_material, look_of, mesh_needs_look
 from ldtrefl.world.outliers import Outliers, outliers_of
 
@@ -87,12 +91,27 @@ class DeviceMesh:
         """Whether the mesh's file says more of its surface than colours and plain pictures."""
         return mesh_needs_look(self.mesh)
 
+    @functools.cached_property
+    def is_single_sided(self) -> bool:
+        """Whether the mesh's file says of some part that it is seen from the front alone."""
+        return any(not part.material.double_sided for part in self.mesh.parts)
+
+    def _owns(self, source: Object) -> list[Material]:
+        """What the scene says of each of the mesh's parts."""
+        return [source.material_of(part.material.name) for part in self.mesh.parts]
+
+    def hides_backs(self, source: Object) -> bool:
+        """Whether an object with this mesh hides backs that may be looked at."""
+        return hides_backs(self.mesh, self._owns(source))
+
     def look(self, source: Object, reflection: Reflection) -> Look:
         """The look of an object with this mesh. Objects of which the scene says the same share one."""
-        owns = [source.material_of(part.material.name) for part in self.mesh.parts]
+        owns = self._owns(source)
         key = (tuple(own.key for own in owns), reflection.threshold, reflection.rough_limit)
         if key not in self._looks:
-            arrays, device = self._look_arrays, self.vertices.device
+            arrays, device = dict(self._look_arrays), self.vertices.device
+            if hides_backs(self.mesh, owns):
+                arrays["has_image"] = self._has_image
             self._looks[key] = look_of(self.mesh, owns, reflection, arrays, device)
         return self._looks[key]
 
@@ -105,6 +124,14 @@ class DeviceMesh:
             missing = np.zeros((0, width), np.float32)
             arrays[name] = self._attribute(missing if values is None else values, dtype)
         return arrays
+
+    @functools.cached_property
+    def _has_image(self) -> wp.array:
+        """(m,) uint8: 1 for triangles whose mirror image is in the mesh, too; empty if none is."""
+        firsts = first_of_equals(self.mesh.vertices)
+        has_image = triangles_with_image(self.mesh.faces if firsts is None else firsts[self.mesh.faces])
+        found = has_image.astype(np.uint8) if has_image.any() else np.zeros(0, np.uint8)
+        return wp.array(found, dtype=wp.uint8, device=self.vertices.device)
 
     @functools.cached_property
     def bare_appearance(self) -> Appearance:

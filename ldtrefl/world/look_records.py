@@ -74,7 +74,8 @@ class MaterialRecord:
     has_mirror: int
     has_fresnel: int  # of the mirror
     has_highlights: int  # whether lights are mirrored, too
-    reflects: int  # whether a ray may be sent from some place of it, mirrored or straight on
+    reflects: int  # whether a ray may be sent from some place of its front, mirrored or straight on
+    hides_back: int  # whether what is seen of its back is not there: rays go straight on
     normal_scale: float
     occlusion_strength: float
     slots: int  # texture slots that are looked at: up to the last one with a texture
@@ -94,6 +95,8 @@ class LookRecord:
     texels: wp.array(dtype=wp.vec3)  # of pictures of floats, linear
     texel_bytes: wp.array(dtype=wp.vec3ub)  # of pictures of 8 bits
     texel_alpha: wp.array(dtype=wp.uint8)
+    has_image: wp.array(dtype=wp.uint8)  # of each triangle, where backs are hidden: 1 if its back stands for the front
+    # of another one, which lies in the same place the other way round; empty if none does
     lets_through: int  # 1 if some part lets light through by its alpha
 
 

@@ -20,9 +20,10 @@ from ldtrefl.files.srgb import srgb_from_linear
 from ldtrefl.files.stored_picture import StoredPicture
 from ldtrefl.scene.description import Reflection
 from ldtrefl.scene.material import Material, is_given
-from ldtrefl.scene.mesh import Mesh
+from ldtrefl.scene.mesh import Mesh, Part
 from ldtrefl.scene.surface_material import PLAIN, SurfaceMaterial, Texture
 from ldtrefl.world import look_records
+from ldtrefl.world.hidden_backs import hides_backs, is_double_sided
 from ldtrefl.world.look_records import LookRecord, MaterialRecord, SlotNumbers
 from ldtrefl.world.texture_pool import TexturePool
 
@@ -47,7 +48,11 @@ ONLY_COLORS = ("name", "base_color", "base_texture", "double_sided", "alpha", "a
 
 def has_material(mesh: Mesh) -> bool:
     """Whether a mesh's file says anything of its colours."""
-    return mesh.colors is not None or any(part.material.name or part.material.key != PLAIN.key for part in mesh.parts)
+    return mesh.colors is not None or any(map(_has_colors, mesh.parts))
+
+
+def _has_colors(part: Part) -> bool:
+    return bool(part.material.name) or replace(part.material, double_sided=True).key != PLAIN.key
 
 
 def mesh_needs_look(mesh: Mesh) -> bool:
@@ -74,7 +79,7 @@ class Look:
 
     record: LookRecord
     reflects: bool
-    """Whether rays may be sent from some part of it."""
+    """Whether rays may be sent from some part of it, mirrored or straight on."""
     lets_through: bool
     """Whether some part lets light through by its alpha."""
     shines: bool
@@ -94,7 +99,7 @@ def look_of(
         mesh: its mesh.
         owns: what the scene says of each of the mesh's parts.
         reflection: from when on rays are sent.
-        arrays: those of the mesh's vertices, by the names of the fields.
+        arrays: those of the mesh, by the names of the fields.
         device: where it is read.
 
     Raises:
@@ -108,6 +113,9 @@ def look_of(
     uv_sets = [mesh.uvs is not None, mesh.second_uvs is not None]
     told = zip(looks, owns, strict=True)
     records = [_material_record(material, own, reflection, pool, uv_sets) for material, own in told]
+    if hides_backs(mesh, owns):
+        for record, material in zip(records, looks, strict=True):
+            record.hides_back = int(not material.double_sided)
     look.materials = wp.array(records, dtype=MaterialRecord, device=device)
     pool.upload(look, device)
     for name, array in arrays.items():
@@ -115,12 +123,13 @@ def look_of(
     shines = any(record.has_mirror or material.reflects for record, material in zip(records, looks, strict=True))
     lets_through = any(material.alpha_mode != "opaque" for material in looks)
     look.lets_through = int(lets_through)
-    return Look(look, any(record.reflects for record in records), lets_through, shines)
+    reflects = any(record.reflects or record.hides_back for record in records)
+    return Look(look, reflects, lets_through, shines)
 
 
 def overridden(material: SurfaceMaterial, own: Material, *, is_of_file: bool) -> SurfaceMaterial:
     """A file's material with what the scene says of the object."""
-    changes: dict[str, Any] = {}
+    changes: dict[str, Any] = {"double_sided": is_double_sided(material, own)}
     red, green, blue = own.albedo if is_given(own.albedo) or any(own.mirror) or not is_of_file else (1.0, 1.0, 1.0)
     of_red, of_green, of_blue = material.base_color
     changes["base_color"] = (red * of_red, green * of_green, blue * of_blue)

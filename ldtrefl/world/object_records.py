@@ -69,10 +69,7 @@ def fill_records(
     records["albedo"], records["mirror"], records["emission"] = albedo, mirror, emission
     is_mirror = (mirror.max(axis=1, initial=0.0) > 0.0) & (look_of < 0)
     records["reflects"] = np.where(looks.reflect(look_of), 2, is_mirror)
-    lets_through = looks.let_through(look_of)
-    # A ray that goes straight on may meet the other side of what it leaves, from either side.
-    returns = _sides_with_returns(meshes, mesh_of, (records["reflects"] > 0) & ~lets_through)
-    records["returns"] = np.where(lets_through, 3, returns)
+    records["returns"] = _sides_with_returns(meshes, mesh_of, records["reflects"] > 0)
 
 
 def fill_places(records: np.ndarray, device_from_unit: np.ndarray, radii: np.ndarray) -> None:

@@ -39,7 +39,7 @@ class ObjectRecord:
     texels: wp.array(dtype=wp.vec3)  # all parts' textures of floats, linear, row 0 at v = 1
     texel_bytes: wp.array(dtype=wp.vec3ub)  # all parts' textures of 8 bits, sRGB, row 0 at v = 1
     decoded: wp.array(dtype=float)  # the linear value of every byte
-    reflects: int  # 1 if rays leave all of its surface, 2 if they leave some of its look's materials, 0 if none do
+    reflects: int  # 1 if rays leave all of its surface, 2 if they may leave some parts by its look, 0 if none do
     look: int  # its number among the scene's looks; -1 if colours, textures and mirror above are all
 
 

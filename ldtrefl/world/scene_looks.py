@@ -41,6 +41,10 @@ class SceneLooks:
         needs = np.array([mesh.needs_look for mesh in meshes], bool)[mesh_of]
         needs |= np.fromiter(map(attrgetter("material.has_model"), sources), bool, len(sources))
         needs |= np.fromiter(map(attrgetter("parts"), sources), bool, len(sources))
+        may_hide = np.array([mesh.is_single_sided for mesh in meshes], bool)[mesh_of]
+        may_hide |= np.fromiter((source.material.double_sided is False for source in sources), bool, len(sources))
+        for index in np.flatnonzero(may_hide & ~needs).tolist():
+            needs[index] = meshes[mesh_of[index]].hides_backs(sources[index])
         for index in np.flatnonzero(needs).tolist():
             numbers[index] = self._number_of(meshes[mesh_of[index]], sources[index])
         return numbers

@@ -34,7 +34,7 @@ def test_everything_is_named() -> None:
     for line in (
         "1 nodes with meshes, 2 triangles",
         "sheet 2 1 UVs 4 x 3 x 0",
-        "paint 1 1 1 1 0.25 blend none",
+        "paint 1 1 1 1 0.25 blend front none",
         "camera 'front': at 0 0 0, fov_y 28.65",
         "light 'bulb': point, 7 7 7 candela",
         "extensions: KHR_lights_punctual, KHR_materials_sheen",

@@ -50,7 +50,8 @@ def test_all_that_a_scene_may_hold_is_written(tmp_path: Path) -> None:
             Object(shape="torus_knot", params={"p": 3, "segments": [60, 8]}, fit=2.0, smooth=False),
             Object(shape="box", scale=(1.0, 2.0, 3.0), material=Material(texture=str(tmp_path / "wood.png"))),
             Object(shape="sphere", material=Material(albedo=0.0, mirror=0.5, fresnel=True)),
-            Object(shape="sphere", material=Material(albedo=0.25, mirror=0.5)),
+            Object(shape="sphere", material=Material(albedo=0.25, mirror=0.5, double_sided=False)),
+            Object(shape="plane", material=Material(double_sided=True)),
         ),
         reflection=Reflection(method="bvh", max_bounces=2),
     )

@@ -6,6 +6,7 @@ import trimesh
 
 import ldtrefl
 from ldtrefl.scene.normals import split_by_side, vertex_normals
+from ldtrefl.scene.two_sided import triangles_with_image
 from tests.scene.sheets import plain_mean, sheet
 
 
@@ -88,3 +89,10 @@ def test_a_fan_of_many_triangles_is_taken_in_one_go() -> None:
     np.testing.assert_allclose(normals[split[0, 0]], [0, 0, 1], atol=1e-6)
     _, split, normals = split_by_side(vertices, np.concatenate([cone, cone[:, ::-1]]).astype(np.int32))
     np.testing.assert_allclose([normals[split[0, 0]], normals[split[-1, 2]]], [[0, 0, 1], [0, 0, -1]], atol=1e-6)
+
+
+def test_triangles_with_an_image_are_found() -> None:
+    """Whatever corner each starts with; the same triangle twice, and one that is near in numbers, are none."""
+    places = [[0, 1, 2], [5, 6, 7], [2, 1, 0], [1, 3, 2], [4, 3, 2], [4, 3, 2], [6, 5, 7], [0, 1, 3], [7, 5, 6]]
+    found = triangles_with_image(np.array(places, np.int32))
+    assert found.tolist() == [True, True, True, False, False, False, True, False, True]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -19,6 +19,10 @@ NEAREST = 9728
 WRAPS: dict[int, Wrap] = {10497: "repeat", 33071: "clamp", 33648: "mirror"}
 IMAGE_SOURCES = ("EXT_texture_webp",)
 """Extensions of textures that name another picture, which is taken."""
+
+
+UNSAID = replace(PLAIN, double_sided=False)
+"""Of primitives without a material: white plaster, as viewers show it, seen from the front (3.9 and 3.7.2.1)."""
 
 
 @dataclass(eq=False)
@@ -38,7 +42,7 @@ class Materials:
             InputError: it is not sound, or a picture of it is damaged.
         """
         if number is None:
-            return PLAIN  # white plaster, as viewers show it
+            return UNSAID
         if number not in self._made:
             self._made[number] = self._read(self.document.entries("materials")[number], f"materials[{number}]")
         return self._made[number]

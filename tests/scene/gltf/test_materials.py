@@ -1,5 +1,6 @@
 """Materials: every number and texture of the file, its samplers and transforms; damaged pictures are refused."""
 
+import dataclasses
 import io
 import math
 from pathlib import Path
@@ -52,7 +53,8 @@ def test_defaults_are_the_specification_s() -> None:
 
 
 def test_a_primitive_without_a_material_is_white_plaster() -> None:
-    assert Materials(Document(Written().as_glb(), nothing_beside)).material(None) is PLAIN
+    made = Materials(Document(Written().as_glb(), nothing_beside)).material(None)
+    assert not made.double_sided and dataclasses.replace(made, double_sided=True).key == PLAIN.key
 
 
 def test_every_number_is_read() -> None:
