@@ -7,6 +7,7 @@ it. Nothing of a large image is kept for the next frame.
 from __future__ import annotations
 
 import dataclasses
+import functools
 import threading
 from collections.abc import Callable, Iterator, Sequence
 
@@ -18,13 +19,15 @@ from ldtrefl.base import budget
 from ldtrefl.base.errors import InputError
 from ldtrefl.device import build_ahead, launch
 from ldtrefl.device.stats import Stats
+from ldtrefl.frame.antialiasing import BEYOND, antialiased, put_into
 from ldtrefl.frame.camera_shading import shade_gbuffer
 from ldtrefl.frame.composite import composed
-from ldtrefl.frame.first_frame import OF_EVERY_SCENE
+from ldtrefl.frame.first_frame import OF_EVERY_SCENE, OF_SAMPLES
 from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.history import FrameHistory, FrameParts, Reusable
 from ldtrefl.frame.reflected_light import ReflectedLight
-from ldtrefl.frame.result import SMALLER, BandedFrame, Frame, WholeFrame, rows_of
+from ldtrefl.frame.result import SMALLER, BandedFrame, Frame, WholeFrame, inner_rows
+from ldtrefl.frame.sample_points import SamplePoints, camera_rays, regions_of, seen_at
 from ldtrefl.frame.skip_options import skip_options_of
 from ldtrefl.frame.visibility import BAND_PIXELS, draw_gbuffer, draw_in_bands
 from ldtrefl.methods import find_method
@@ -39,8 +42,11 @@ __all__ = ["Frame", "Renderer", "render"]
 LARGEST_WHOLE = 1 << 22
 """Pixels up to which an image is made as a whole: 2048 x 2048."""
 
-IMAGE_BYTES = 13
-"""Bytes of a pixel of the result: its radiance, and whether it sees a reflector."""
+IMAGE_BYTES = 15
+"""Bytes of a pixel of the result: its radiance, whether it sees a reflector, and how often it was sampled."""
+
+RAY_COUNTERS = ("rays", "steps", "searches", "searches_saved")
+"""What is counted of a frame's rays, those of all samples together."""
 
 WORKING_BYTES = 200
 """Bytes of a pixel on the way: its key, what it sees, its radiance, its ray and where that ends."""
@@ -76,6 +82,7 @@ class Renderer:
         self._lock = threading.RLock()
         self._name, self._options = kind.name, dict(options)
         self._skip = skip_options_of(config.skip)
+        self._sampling = config.sampling(scene)
         device_scene = DeviceScene(scene, launch.resolve_device(device), skip_attributes=self._skip.attributes)
         self._device_scene = device_scene
         """As it stood when it was last needed."""
@@ -85,7 +92,8 @@ class Renderer:
         """Answers the rays of methods that have any, and the shadow rays of every method."""
         self._method = kind(device_scene, config, self._tracer)
         if device_scene.device.is_cpu:
-            build_ahead.foresee([*self._method.first_kernels(), *OF_EVERY_SCENE], launch.thread_count())
+            of_samples = OF_SAMPLES if self._sampling.samples > 1 else ()
+            build_ahead.foresee([*self._method.first_kernels(), *OF_EVERY_SCENE, *of_samples], launch.thread_count())
         self._history = FrameHistory(keeps=self._skip.frames)
         self._bytes_taken = 0
         """Memory that has been asked for: what the largest frame so far needs."""
@@ -194,21 +202,27 @@ class Renderer:
             with stats.stage("gbuffer", scene.device):
                 gbuffer = self._history.gbuffer(scene, camera, search)
             parts = self._parts(gbuffer, reusable, stats)
-        image = self._composed(parts, stats)
+        parts, image = self._with_samples(parts, stats)
         self._history.keep(scene, camera, parts)
-        self._count(scene, stats)
+        self._count(scene, parts.gbuffer.reflector_mask, stats)
         return Frame(image, stats, WholeFrame.of(parts))
 
     def _in_bands(self, camera: Camera) -> Frame:
         scene, stats = self._as_it_stands(), Stats()
         image = np.empty((camera.height, camera.width, 3), np.float32)
-        mask = np.empty((camera.height, camera.width), bool)
-        for parts in self._bands(camera, stats):
-            image[rows_of(parts.gbuffer)] = self._composed(parts, stats)
-            mask[rows_of(parts.gbuffer)] = parts.gbuffer.reflector_mask
+        mask, counts = (np.empty((camera.height, camera.width), kind) for kind in (bool, np.uint16))
+        beyond = 0 if self._sampling.samples == 1 else BEYOND
+        for parts in self._bands(camera, stats, beyond):
+            sampled, band = self._with_samples(parts, stats)
+            # A row that two bands have is right in the one that has its neighbours, too.
+            inner = inner_rows(parts.gbuffer.band, camera, beyond)
+            within = slice(inner.start - parts.gbuffer.band.first_row, inner.stop - parts.gbuffer.band.first_row)
+            image[inner] = band[within]
+            mask[inner] = parts.gbuffer.reflector_mask[within]
+            counts[inner] = 1 if sampled.antialiased is None else sampled.antialiased.counts[within]
         self._history.keep_view(scene, camera)
-        self._count(scene, stats)
-        return Frame(image, stats, BandedFrame(mask, self._bands_again(scene, camera)))
+        self._count(scene, mask, stats)
+        return Frame(image, stats, BandedFrame(mask, counts, self._bands_again(scene, camera)))
 
     def _bands_again(self, scene: DeviceScene, camera: Camera) -> Callable[[], Iterator[FrameParts]]:
         """A function that renders the bands again by a new renderer, whatever moves meanwhile."""
@@ -219,11 +233,13 @@ class Renderer:
 
         return bands
 
-    def _bands(self, camera: Camera, stats: Stats) -> Iterator[FrameParts]:
-        """A large image from top to bottom; nothing of it, nor of the last frame, is kept."""
+    def _bands(self, camera: Camera, stats: Stats, beyond: int = 0) -> Iterator[FrameParts]:
+        """A large image from top to bottom; nothing of it, nor of the last frame, is kept. Each band goes on for
+        ``beyond`` rows."""
         scene = self._looking_from(camera)
         self._history.forget()
-        bands = draw_in_bands(scene, camera, self._method.camera_search(scene, camera, stats))
+        search = self._method.camera_search(scene, camera, stats)
+        bands = draw_in_bands(scene, camera, search, beyond=beyond)
         while True:
             with stats.stage("gbuffer", scene.device):
                 gbuffer = next(bands, None)
@@ -249,18 +265,38 @@ class Renderer:
 
     def _shadow_tracer(self, gbuffer: GBuffer, stats: Stats) -> BoundTracer:
         """The tracer that answers the shadow rays of what the camera sees."""
-        if gbuffer.scene.lighting.shadows:
+        if gbuffer.scene.lighting.shadows and not isinstance(gbuffer, SamplePoints):
             self._method.foresee(gbuffer, stats)
         return shadow_tracer(self._tracer, gbuffer.scene, stats)
 
-    def _composed(self, parts: FrameParts, stats: Stats) -> np.ndarray:
-        """(h, w, 3) float32 radiance of a frame or a band."""
-        stats.count("pixels", parts.gbuffer.pixel_count)
-        stats.count("reflector_pixels", parts.gbuffer.reflector_pixels.shape[0])
-        with stats.stage("composite", parts.gbuffer.scene.device):
-            return composed(parts)
+    def _with_samples(self, parts: FrameParts, stats: Stats) -> tuple[FrameParts, np.ndarray]:
+        """A frame or a band with more samples where it needs them, and (h, w, 3) float32 its radiance."""
+        gbuffer, known = parts.gbuffer, parts.antialiased
+        with stats.stage("composite", gbuffer.scene.device):
+            radiance = composed(parts)
+        if self._sampling.samples > 1:
+            with stats.stage("samples", gbuffer.scene.device):
+                if known is None:
+                    seen = functools.partial(self._seen, gbuffer, stats)
+                    known = antialiased(parts, radiance, self._sampling, seen)
+                put_into(known, radiance)
+            stats.count("samples", int(known.counts.sum()))
+        return dataclasses.replace(parts, antialiased=known), radiance.numpy().reshape(*gbuffer.shape, 3)
 
-    def _count(self, scene: DeviceScene, stats: Stats) -> None:
+    def _seen(self, image: GBuffer, stats: Stats, place: wp.array) -> wp.array:
+        """(n,) vec3: the radiance that (n,) vec2d points of a band's image see, in its pixels."""
+        rays, of_samples = camera_rays(image, place), Stats()
+        regions = regions_of(image, rays)
+        tracer = self._method.sample_tracer(image.scene, regions.shown, of_samples)
+        points = seen_at(image, place, rays, regions, tracer, by_bounds=self._skip.bounds)
+        parts = self._parts(points, None, of_samples)
+        for name in RAY_COUNTERS:
+            stats.count(name, of_samples.counters.get(name, 0))
+        return composed(parts)
+
+    def _count(self, scene: DeviceScene, mask: np.ndarray, stats: Stats) -> None:
+        stats.count("pixels", mask.size)
+        stats.count("reflector_pixels", int(np.count_nonzero(mask)))
         stats.count("rays", 0)  # methods without rays have that counter, too
         stats.count("attribute_bytes", scene.attribute_bytes)
 

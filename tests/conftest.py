@@ -10,6 +10,7 @@ import pytest
 
 import ldtrefl
 from ldtrefl.files.map_cache import MapCache
+from ldtrefl.methods import base
 from ldtrefl.scene import shapes
 
 SCENES = Path(__file__).parent.parent / "scenes"
@@ -69,6 +70,18 @@ def real_mesh() -> Callable[[str], ldtrefl.Mesh]:
 def mesh_or_shape(real_mesh: Callable[[str], ldtrefl.Mesh]) -> Callable[[str], ldtrefl.Mesh]:
     """A procedural shape by name, or a real mesh by file name."""
     return lambda name: real_mesh(name) if "." in name else shapes.make(name)
+
+
+USUAL_SAMPLES = base.DEFAULT_SAMPLES
+"""Samples of a pixel where nothing is said."""
+
+
+@pytest.fixture(autouse=True)
+def one_sample() -> Iterator[None]:
+    """Tests look at what the centres of pixels see, unless they ask for samples: closed forms are of points."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(base, "DEFAULT_SAMPLES", 1)
+        yield
 
 
 @pytest.fixture(autouse=True)

@@ -197,7 +197,7 @@ def ablate(name: str, scene: Scene, skip: str, rounds: int) -> SkipRow:
         def first_frame(way: str) -> float:
             anew = with_new_meshes(scene)
             start = time.perf_counter()
-            frames[way] = Renderer(anew, "ldt", skip=made[way]).render()
+            frames[way] = Renderer(anew, "ldt", skip=made[way], samples=1).render()
             return time.perf_counter() - start
 
         times, ratio = compared({way: functools.partial(first_frame, way) for way in made}, rounds)
@@ -205,8 +205,8 @@ def ablate(name: str, scene: Scene, skip: str, rounds: int) -> SkipRow:
         # But to measure what is kept between frames, every frame is made anew.
         kept = () if skip == "frames" else ("frames",)
         renderers = {
-            "with": Renderer(scene, "ldt", skip=all_but(*kept)),
-            "without": Renderer(scene, "ldt", skip=all_but(*kept, skip)),
+            "with": Renderer(scene, "ldt", skip=all_but(*kept), samples=1),
+            "without": Renderer(scene, "ldt", skip=all_but(*kept, skip), samples=1),
         }
         firsts = {way: renderer.render() for way, renderer in renderers.items()}
         frames = {}
@@ -235,7 +235,10 @@ def ablate(name: str, scene: Scene, skip: str, rounds: int) -> SkipRow:
 
 def moved(name: str, scene: Scene, rounds: int) -> SkipRow:
     """What ``frames`` is worth in the heavy scene, called ``name``, where its torus moves before every frame."""
-    renderers = {"with": Renderer(scene, "ldt"), "without": Renderer(scene, "ldt", skip=all_but("frames"))}
+    renderers = {
+        "with": Renderer(scene, "ldt", samples=1),
+        "without": Renderer(scene, "ldt", skip=all_but("frames"), samples=1),
+    }
     frames: dict[str, Frame] = {}
     step = dict.fromkeys(renderers, 0)
 
@@ -261,9 +264,9 @@ def culling(name: str, scene: Scene, rounds: int) -> CullingRow | None:
     """Rays handed to the search against rays that enter a bounding sphere; pixels lost; what culling takes. None for a
     scene without reflected rays."""
     renderers = {
-        "none": Renderer(scene, "ldt", skip=all_but("frames", "regions", "bounds")),
-        "safe": Renderer(scene, "ldt", skip=all_but("frames")),
-        "flat": Renderer(scene, "ldt", skip=all_but("frames"), cull="flat"),
+        "none": Renderer(scene, "ldt", skip=all_but("frames", "regions", "bounds"), samples=1),
+        "safe": Renderer(scene, "ldt", skip=all_but("frames"), samples=1),
+        "flat": Renderer(scene, "ldt", skip=all_but("frames"), cull="flat", samples=1),
     }
     frames = {way: renderer.render() for way, renderer in renderers.items()}
     if not frames["safe"].stats.counters["rays"]:

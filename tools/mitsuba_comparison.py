@@ -44,7 +44,7 @@ def shipped() -> dict[str, Path]:
 def judged(name: str, scene: ldtrefl.Scene) -> Judgement:
     """Render a scene's emission-only version by both, and count the pixels that differ."""
     scene = emission_only(scene)
-    ours = ldtrefl.render(scene, "bvh", max_bounces=BOUNCES)
+    ours = ldtrefl.render(scene, "bvh", max_bounces=BOUNCES, samples=1)
     theirs = MitsubaPictures(scene)
     paths, spawned = theirs.followed(BOUNCES, SMALL_LIFT), theirs.followed(BOUNCES, None)
     return judgement(name, ours.image, paths, spawned, theirs.by_path_integrator(BOUNCES))

@@ -14,7 +14,7 @@ from ldtrefl.base.errors import InputError
 from ldtrefl.device.launch import set_threads
 from ldtrefl.files.regular_files import check_regular
 from ldtrefl.scene import shapes
-from ldtrefl.scene.description import Scene
+from ldtrefl.scene.description import MAX_SAMPLES, Scene
 from ldtrefl.scene.load import load_scene
 from ldtrefl.scene.mesh import Mesh
 from ldtrefl.scene.readers import load_mesh
@@ -47,6 +47,16 @@ Lenient = Annotated[
 ]
 Size = Annotated[
     str | None, typer.Option("--size", metavar="WxH", help="Pixels of the picture; the scene's own if not given.")
+]
+Samples = Annotated[
+    int | None,
+    typer.Option(
+        "--samples",
+        min=1,
+        max=MAX_SAMPLES,
+        help="The most samples of a pixel, which it gets where it differs from its neighbours; the scene's number, or "
+        "4, if not given.",
+    ),
 ]
 CacheFolder = Annotated[
     Path | None, typer.Option("--cache", metavar="DIR", help="Keep maps here; the user's cache folder if not given.")

@@ -8,10 +8,10 @@ from __future__ import annotations
 import warp as wp
 
 from ldtrefl.device.native_sources import native_body
-from ldtrefl.frame.gbuffer import pixel_ray
+from ldtrefl.frame.gbuffer import GBufferView, ray_through
 from ldtrefl.geometry.vectors import as_single
 from ldtrefl.shading.environment import environment_radiance
-from ldtrefl.world.camera import CameraView, camera_ray
+from ldtrefl.world.camera import camera_ray
 from ldtrefl.world.records import LightingRecord
 
 FILES = ("device/vectors.h", "frame/backdrop.h")
@@ -46,14 +46,16 @@ def fill_gradient(
 
 @wp.func
 def fill_backdrop(
-    camera: CameraView, lighting: LightingRecord, begin: int, end: int, radiance_out: wp.array(dtype=wp.vec3)
+    gbuffer: GBufferView, lighting: LightingRecord, begin: int, end: int, radiance_out: wp.array(dtype=wp.vec3)
 ):
     """Fill in the radiance of the environment for the pixels from ``begin`` to ``end``."""
+    camera = gbuffer.camera
+    in_rows = lighting.image_size[0] == 0 and gbuffer.place.shape[0] == 0
     i = int(begin)
     while i < end:
         row = i / camera.width
-        rest = wp.min(end, (row + 1) * camera.width)
-        if lighting.image_size[0] == 0:
+        rest = wp.where(in_rows, wp.min(end, (row + 1) * camera.width), end)
+        if in_rows:
             half = wp.float64(0.5)
             middle = as_single(camera_ray(camera, half * wp.float64(camera.width), wp.float64(row) + half))
             right = as_single(camera.right)
@@ -62,5 +64,6 @@ def fill_backdrop(
             i = rest
         else:
             while i < rest:
-                radiance_out[i] = environment_radiance(lighting, wp.normalize(as_single(pixel_ray(camera, i))))
+                way = as_single(ray_through(gbuffer, i))
+                radiance_out[i] = environment_radiance(lighting, wp.normalize(way))
                 i += 1

@@ -51,7 +51,7 @@ def shade_pixels_kernel(tracer: Tracer, has_looks: bool, has_alpha: bool) -> wp.
             begin = int(i)
             while i < end and gbuffer.object[i] < 0:
                 i += 1
-            fill_backdrop(gbuffer.camera, lighting, begin, i, radiance_out)
+            fill_backdrop(gbuffer, lighting, begin, i, radiance_out)
             begin = int(i)
             lanes = int(0)
             while i < wp.min(end, begin + GROUP) and gbuffer.object[i] >= 0:

@@ -50,8 +50,8 @@ def add_reflection(
     image[pixel] = image[pixel] + wp.cw_mul(mirror[i], reflected[i])
 
 
-def composed(parts: FrameParts) -> np.ndarray:
-    """(h, w, 3) float32 radiance of a frame, or a band of one."""
+def composed(parts: FrameParts) -> wp.array:
+    """(pixels,) vec3 radiance of a frame, or a band of one."""
     gbuffer, shaded = parts.gbuffer, parts.shaded
     device, pixels = gbuffer.scene.device, gbuffer.reflector_pixels
     # By all threads: memory that is new to the process is slow to write.
@@ -59,8 +59,7 @@ def composed(parts: FrameParts) -> np.ndarray:
     launch.launch(copy_pixels, -(-image.shape[0] // block), [block, shaded.radiance, image], device)
     inputs = [pixels, shaded.mirror, parts.reflected.radiance, image]
     launch.launch(add_reflection, pixels.shape[0], inputs, device)
-    picture: np.ndarray = image.numpy().reshape(*gbuffer.shape, 3)
-    return picture
+    return image
 
 
 def reflection_picture(shape: tuple[int, int], pixels: wp.array, radiance: wp.array) -> np.ndarray:

@@ -28,6 +28,7 @@ class GBufferView:
     triangle: wp.array(dtype=wp.int32)  # set only where something is seen
     reflector: wp.array(dtype=wp.uint8)  # 1 where a reflector is seen
     camera: CameraView
+    place: wp.array(dtype=wp.vec2d)  # points of the image that are seen in place of its pixels; empty: the pixels
 
 
 @wp.func
@@ -39,11 +40,19 @@ def pixel_ray(camera: CameraView, pixel: int) -> wp.vec3d:
 
 
 @wp.func
+def ray_through(gbuffer: GBufferView, i: int) -> wp.vec3d:
+    """Direction through the centre of pixel ``i``, or through point ``i`` if these are seen in place of pixels."""
+    if gbuffer.place.shape[0] == 0:
+        return pixel_ray(gbuffer.camera, i)
+    return camera_ray(gbuffer.camera, gbuffer.place[i][0], gbuffer.place[i][1])
+
+
+@wp.func
 def sight(gbuffer: GBufferView, pixel: int, sightings: wp.array(dtype=Sighting), lane: int):
     """Let a lane of a group see what a pixel sees."""
     sightings[lane].object = gbuffer.object[pixel]
     sightings[lane].triangle = gbuffer.triangle[pixel]
-    sightings[lane].way = pixel_ray(gbuffer.camera, pixel)
+    sightings[lane].way = ray_through(gbuffer, pixel)
 
 
 @launch.kernel

@@ -28,6 +28,18 @@ from ldtrefl.world.device_scene import DeviceScene
 
 
 @dataclass(frozen=True, eq=False)
+class Antialiased:
+    """Pixels that have been sampled more than once, or have such neighbours."""
+
+    pixels: wp.array
+    """(n,) int32."""
+    radiance: wp.array
+    """(n,) vec3: of all their samples."""
+    counts: np.ndarray
+    """(h, w) uint16: how often each pixel of the image was sampled."""
+
+
+@dataclass(frozen=True, eq=False)
 class FrameParts:
     """What a frame, or a band of one, is composed of."""
 
@@ -36,6 +48,8 @@ class FrameParts:
     reflected: ReflectedLight
     stages: tuple[str, ...]
     """The names of the stages that were timed."""
+    antialiased: Antialiased | None = None
+    """What is not as it is at the pixels' centres, if pixels may have more samples."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,8 +16,10 @@ from ldtrefl.device.stats import Stats
 from ldtrefl.frame.bounce_hits import BounceHits, FirstHits
 from ldtrefl.frame.composite import reflection_picture
 from ldtrefl.frame.gbuffer import GBuffer
-from ldtrefl.frame.history import FrameParts
+from ldtrefl.frame.history import Antialiased, FrameParts
+from ldtrefl.scene.description import Camera
 from ldtrefl.tracing.ray_buffers import RayBuffer, RayEnds, joined
+from ldtrefl.world.camera import Band
 
 HIT_BYTES = 112
 """Bytes for each pixel that sees a reflector: its ray and where that ends, joined from all bands."""
@@ -37,6 +39,9 @@ class FrameSource(Protocol):
 
     def reflector_mask(self) -> np.ndarray:
         """``Frame.reflector_mask``."""
+
+    def sample_counts(self) -> np.ndarray:
+        """``Frame.sample_counts``."""
 
     def hits(self) -> FirstHits | None:
         """``Frame.hits``."""
@@ -70,6 +75,11 @@ class Frame:
         return self._source.reflector_mask()
 
     @functools.cached_property
+    def sample_counts(self) -> np.ndarray:
+        """(h, w) uint16: how often each pixel was sampled. All but ``image`` is of the samples at pixels' centres."""
+        return self._source.sample_counts()
+
+    @functools.cached_property
     def hits(self) -> FirstHits | None:
         """Where the first reflected rays ended, and in ``hits.later`` those that went on from there; None for methods
         without rays."""
@@ -91,12 +101,14 @@ class WholeFrame:
     reflector: wp.array
     """(h * w,) uint8: 1 for those pixels."""
     first_hits: FirstHits | None
+    antialiased: Antialiased | None
 
     @classmethod
     def of(cls, parts: FrameParts) -> WholeFrame:
         """Keep what a frame's pictures are made from, and no more: the memory of the other parts is used again."""
         gbuffer, reflected = parts.gbuffer, parts.reflected
-        return cls(gbuffer.shape, gbuffer.reflector_pixels, reflected.radiance, gbuffer.view.reflector, reflected.hits)
+        seen = (reflected.radiance, gbuffer.view.reflector, reflected.hits)
+        return cls(gbuffer.shape, gbuffer.reflector_pixels, *seen, parts.antialiased)
 
     def reflection(self) -> np.ndarray:
         """``Frame.reflection``."""
@@ -105,6 +117,10 @@ class WholeFrame:
     def reflector_mask(self) -> np.ndarray:
         """``Frame.reflector_mask``."""
         return np.array(self.reflector.numpy()).view(bool).reshape(self.shape)
+
+    def sample_counts(self) -> np.ndarray:
+        """``Frame.sample_counts``."""
+        return np.ones(self.shape, np.uint16) if self.antialiased is None else self.antialiased.counts.copy()
 
     def hits(self) -> FirstHits | None:
         """``Frame.hits``: a copy of this frame's own, for hits keep the pictures that they have been asked for."""
@@ -116,6 +132,8 @@ class BandedFrame:
     """What a frame that was made in bands gives beside its image. The bands are rendered again, to the same bits."""
 
     mask: np.ndarray
+    counts: np.ndarray
+    """(h, w) uint16."""
     render_bands: Callable[[], Iterator[FrameParts]]
 
     def reflection(self) -> np.ndarray:
@@ -132,6 +150,10 @@ class BandedFrame:
     def reflector_mask(self) -> np.ndarray:
         """``Frame.reflector_mask``."""
         return self.mask
+
+    def sample_counts(self) -> np.ndarray:
+        """``Frame.sample_counts``."""
+        return self.counts
 
     def hits(self) -> FirstHits | None:
         """``Frame.hits``."""
@@ -167,6 +189,12 @@ def _joined_hits(shape: tuple[int, int], bands: list[tuple[int, FirstHits]]) -> 
     most = max(len(hits.later) for _, hits in bands)
     later = [[(pixel, hits.later[k]) for pixel, hits in bands if k < len(hits.later)] for k in range(most)]
     return FirstHits(shape, first.ends, units, rays, tuple(joined_bounce(bounces) for bounces in later))
+
+
+def inner_rows(band: Band, camera: Camera, beyond: int) -> slice:
+    """The rows of the image that a band is right for that goes on for so many rows beyond them, if the image does."""
+    end = band.first_row + band.rows
+    return slice(band.first_row + (beyond if band.first_row else 0), end - (beyond if end < camera.height else 0))
 
 
 def rows_of(gbuffer: GBuffer) -> slice:

@@ -14,7 +14,7 @@ import numpy as np
 from ldtrefl.frame.drawn_objects import DrawnObjects
 from ldtrefl.frame.instances import MANY
 from ldtrefl.scene.description import Camera
-from ldtrefl.world.camera import Band, whole_image
+from ldtrefl.world.camera import Band, pixels_from_world, whole_image
 from ldtrefl.world.device_scene import DeviceScene
 
 FEWEST_TRIANGLES = 20_000
@@ -98,3 +98,16 @@ def objects_to_search(scene: DeviceScene, camera: Camera) -> np.ndarray:
     sides = 2.0 * np.linalg.norm(scene.world_from_unit[objects.numbers, :3, :3], axis=1).max(axis=1)
     is_small = sides * pixels_at_1 <= LARGEST_SIZE * whole.nearest
     return objects.numbers[pays & is_small]
+
+
+def large_objects_in_view(scene: DeviceScene, camera: Camera) -> np.ndarray:
+    """(n,) int64 numbers of the objects of many triangles that the image may show, ascending."""
+    large = np.flatnonzero(scene.triangle_counts >= FEWEST_TRIANGLES)
+    matrix = pixels_from_world(camera) @ np.linalg.inv(scene.device_from_world)
+    # How far a point is on the inner side of each plane that bounds the view, by way of the planes' unit normals.
+    planes = np.stack(
+        [matrix[0], camera.width * matrix[2] - matrix[0], matrix[1], camera.height * matrix[2] - matrix[1]]
+    )
+    planes /= np.linalg.norm(planes[:, :3], axis=1, keepdims=True)
+    inside = scene.spheres[large, :3] @ planes[:, :3].T + planes[:, 3]
+    return large[(inside >= -scene.spheres[large, 3:]).all(axis=1)]

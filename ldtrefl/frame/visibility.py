@@ -14,7 +14,7 @@ import warp as wp
 
 from ldtrefl.device import launch
 from ldtrefl.frame.drawn_objects import DrawnObjects
-from ldtrefl.frame.gbuffer import GBuffer, GBufferView, pixel_ray
+from ldtrefl.frame.gbuffer import GBuffer, GBufferView, ray_through
 from ldtrefl.frame.pixel_box import BEHIND
 from ldtrefl.frame.pixel_order import BLOCK
 from ldtrefl.frame.projection import DrawnObject, corner_of, homogeneous
@@ -29,7 +29,7 @@ from ldtrefl.geometry.perspective_raster import (
 from ldtrefl.geometry.vectors import as_single
 from ldtrefl.scene.description import Camera
 from ldtrefl.shading.surface import may_see_back, part_of
-from ldtrefl.world.camera import Band, CameraView, camera_view, whole_image
+from ldtrefl.world.camera import Band, camera_view, whole_image
 from ldtrefl.world.device_scene import DeviceScene
 from ldtrefl.world.look_records import Looks
 from ldtrefl.world.records import ObjectRecord
@@ -95,14 +95,15 @@ def of_its_group(
 
 
 @wp.func
-def leads_on(
-    objects: wp.array(dtype=ObjectRecord), looks: Looks, index: int, triangle: int, camera: CameraView, pixel: int
-) -> int:
-    """1 if a ray may go on, mirrored or straight, from a triangle of an object with a look that a pixel of a band sees;
+def leads_on(objects: wp.array(dtype=ObjectRecord), looks: Looks, gbuffer: GBufferView, i: int, reflects: int) -> int:
+    """1 if a ray may go on, mirrored or straight, from what pixel ``i`` sees of an object that ``reflects`` in this way;
     else 0."""
+    if reflects != 2:
+        return reflects
+    index, triangle = gbuffer.object[i], gbuffer.triangle[i]
     look, part = objects[index].look, part_of(objects, index, triangle)
     if looks.records[look].materials[part].hides_back != 0:
-        if may_see_back(objects[index], triangle, as_single(wp.normalize(pixel_ray(camera, pixel)))):
+        if may_see_back(objects[index], triangle, as_single(wp.normalize(ray_through(gbuffer, i)))):
             return 1
     return looks.records[look].materials[part].reflects
 
@@ -144,9 +145,7 @@ def resolve_pixels(
                 triangle = of_its_group(one, objects, corners, triangle, 1 << numbers.shift, pixel, key)
             seen.object[i] = index
             seen.triangle[i] = triangle
-            is_mirror = reflects
-            if reflects == 2:
-                is_mirror = leads_on(objects, looks, index, triangle, seen.camera, i)
+            is_mirror = leads_on(objects, looks, seen, i, reflects)
             seen.reflector[i] = wp.where(is_mirror != 0, wp.uint8(1), wp.uint8(0))
         i += 1
 
@@ -198,15 +197,17 @@ def draw_gbuffer(scene: DeviceScene, camera: Camera, search: CameraSearch | None
 
 
 def draw_in_bands(
-    scene: DeviceScene, camera: Camera, search: CameraSearch | None = None, *, without: int = -1
+    scene: DeviceScene, camera: Camera, search: CameraSearch | None = None, *, without: int = -1, beyond: int = 0
 ) -> Iterator[GBuffer]:
-    """The same, band by band from the top; object number ``without`` is left out."""
+    """The same, band by band from the top; object number ``without`` is left out. Each band goes on for ``beyond`` rows
+    above and below, if the image does."""
     everything = np.arange(len(scene.objects))
     objects = DrawnObjects.of(scene, camera, everything[everything != without])
     rows = max(1, BAND_PIXELS // camera.width // BLOCK) * BLOCK
     room = CornerRoom.of(scene, numbers_of(search))
     for row in range(0, camera.height, rows):
-        drawing = Drawing(camera, Band(row, min(rows, camera.height - row)), room)
+        top, bottom = max(0, row - beyond), min(camera.height, row + rows + beyond)
+        drawing = Drawing(camera, Band(top, bottom - top), room)
         # Corners are the whole image's: those that are kept are found once.
         drawing.draw(scene, objects, search, are_projected=row > 0 and room.keeps)
         yield resolved(drawing, scene)

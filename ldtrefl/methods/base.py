@@ -29,6 +29,7 @@ import dataclasses
 import inspect
 import itertools
 import textwrap
+from collections.abc import Collection
 from typing import Annotated, Any, ClassVar
 
 import warp as wp
@@ -37,17 +38,21 @@ from pydantic.dataclasses import dataclass as pydantic_dataclass
 
 from ldtrefl.base.errors import InputError, first_fault, unknown_name
 from ldtrefl.device.stats import Stats
+from ldtrefl.frame.antialiasing import Sampling
 from ldtrefl.frame.bounces import BounceLimits
 from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.history import Reusable
 from ldtrefl.frame.reflected_light import ReflectedLight
 from ldtrefl.frame.searched_pixels import CameraSearch
 from ldtrefl.frame.skip_options import SkipChoice, skip_names, skip_options_of
-from ldtrefl.scene.description import Camera, Scene
+from ldtrefl.scene.description import MAX_SAMPLES, Camera, Scene
 from ldtrefl.tracing.ray_buffers import RayBuffer
 from ldtrefl.tracing.scene_bvh import SceneBvh
-from ldtrefl.tracing.tracer import SceneTracer
+from ldtrefl.tracing.tracer import BoundTracer, SceneTracer
 from ldtrefl.world.device_scene import DeviceScene
+
+DEFAULT_SAMPLES = 4
+"""Samples of a pixel that differs from its neighbours, if nothing is said."""
 
 CONFIG = ConfigDict(extra="forbid")
 """How every method's ``Config`` is checked."""
@@ -62,6 +67,18 @@ class CommonConfig:
         SkipChoice,
         Field(description=f"What is left out: all that can be, none, or a list of {', '.join(skip_names())}."),
     ] = "all"
+    samples: Annotated[
+        Annotated[int, Field(strict=True, ge=1, le=MAX_SAMPLES)] | None,
+        Field(description=f"The most samples of a pixel, 1 to {MAX_SAMPLES}; the scene's number, or 4, if not given."),
+    ] = None
+    adaptive: Annotated[
+        Annotated[bool, Field(strict=True)],
+        Field(description="Whether a pixel that does not differ from its neighbours is sampled once."),
+    ] = True
+
+    def sampling(self, scene: Scene) -> Sampling:
+        """How often the pixels of a scene's image are sampled."""
+        return Sampling(self.samples or scene.reflection.samples or DEFAULT_SAMPLES, self.adaptive)
 
 
 @pydantic_dataclass(frozen=True, kw_only=True, config=CONFIG)
@@ -117,6 +134,11 @@ class Method(abc.ABC):
         """The objects of ``scene`` that this frame's camera rays are to be searched for in, and by what; None to draw
         all. It may depend on the scene and the camera alone. Called before anything else of a frame."""
         return None
+
+    def sample_tracer(self, scene: DeviceScene, objects: Collection[int], stats: Stats) -> BoundTracer:
+        """What answers the camera's rays between the pixels' centres, which can meet these objects: it must see them
+        as they are drawn."""
+        return self.tracer.bound(scene, objects, stats)
 
     def foresee(self, gbuffer: GBuffer, stats: Stats) -> None:  # noqa: B027  (most methods have nothing to foresee)
         """Make the tracer ready for what the camera sees. Called before shadow rays are asked of it, only if the scene

@@ -16,7 +16,7 @@ Fails: ``search=linear`` misses what is thinner than a step or a texel, and its 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Annotated, Literal
 
 import numpy as np
@@ -43,7 +43,8 @@ from ldtrefl.frame.regions import (
     objects_that_rays_meet,
     safe_regions,
 )
-from ldtrefl.frame.search_choice import objects_to_search
+from ldtrefl.frame.sample_points import SamplePoints
+from ldtrefl.frame.search_choice import large_objects_in_view, objects_to_search
 from ldtrefl.frame.searched_pixels import CameraSearch
 from ldtrefl.ldt.exact.build import KERNELS as TREE_KERNELS
 from ldtrefl.ldt.options import (
@@ -62,6 +63,7 @@ from ldtrefl.ldt.searches import TRACERS
 from ldtrefl.methods.base import CONFIG, CommonConfig, RayConfig, RayMethod
 from ldtrefl.scene.description import Camera
 from ldtrefl.tracing.ray_buffers import RayBuffer
+from ldtrefl.tracing.scene_bvh import SceneBvh
 from ldtrefl.tracing.tracer import BoundTracer, SceneTracer
 from ldtrefl.world.device_mesh import DeviceMesh
 from ldtrefl.world.device_scene import DeviceScene
@@ -101,6 +103,8 @@ class Ldt(RayMethod):
         super().__init__(scene, config, tracer)
         self._has_moved = False
         """Whether any object has moved. Culling then pays: it tells which rays of the last frame serve again."""
+        self._caster = SceneBvh()
+        """Sees what the camera does between the pixels' centres, if the maps have not every triangle."""
 
     @classmethod
     def scene_tracer(cls, config: CommonConfig) -> SceneTracer:
@@ -123,12 +127,22 @@ class Ldt(RayMethod):
         """Meshes whose triangles are many and small in the image are searched by the exact search, unless maps are to
         be as coarse as an error allows."""
         numbers = np.zeros(0, np.int64)
-        if self.config.search == "exact" and not self._chooses:
+        if self._traces_exactly:
             numbers = objects_to_search(scene, camera)
-        self.tracer.searched_by_camera = frozenset(scene.meshes[k] for k in np.unique(scene.mesh_of[numbers]))
+        sampled = numbers
+        if self._traces_exactly and self.config.sampling(scene.scene).samples > 1:
+            # Samples between the pixels' centres are searched for, too, and must see meshes as they are drawn.
+            sampled = np.union1d(numbers, large_objects_in_view(scene, camera))
+        self.tracer.searched_by_camera = frozenset(scene.meshes[k] for k in np.unique(scene.mesh_of[sampled]))
         if not len(numbers):
             return None
         return CameraSearch(numbers, self.tracer.bound(scene, numbers.tolist(), stats))
+
+    def sample_tracer(self, scene: DeviceScene, objects: Collection[int], stats: Stats) -> BoundTracer:
+        """The maps, where they have every triangle; else the ray caster."""
+        if self._traces_exactly:
+            return self.tracer.bound(scene, objects, stats)
+        return self._caster.bound(scene, objects, stats)
 
     def foresee(self, gbuffer: GBuffer, stats: Stats) -> None:
         """Choose maps for the frame's shadows that are as fine as its reflections need them, too."""
@@ -158,6 +172,8 @@ class Ldt(RayMethod):
     def regions(self, gbuffer: GBuffer, rays: RayBuffer, bounce: int, stats: Stats) -> Regions:
         """Cull the rays of a bounce, and choose how fine the maps must be that they are searched for in."""
         regions = self._culled(gbuffer, rays, bounce, stats)
+        if isinstance(gbuffer, SamplePoints):
+            return regions  # the maps are those of the pixels that they lie about
         if bounce == 0:
             if not self.scene.lighting.shadows:  # which have chosen already (``foresee``)
                 self.tracer.chosen = self._resolutions(gbuffer, rays, regions)
@@ -185,6 +201,11 @@ class Ldt(RayMethod):
             return False
         then, chosen = reusable.reflected.resolutions, self.tracer.chosen
         return all(then[mesh] == chosen[mesh] for mesh in then.keys() & chosen.keys())
+
+    @property
+    def _traces_exactly(self) -> bool:
+        """Whether the camera's rays may be searched for in the maps."""
+        return self.config.search == "exact" and not self._chooses
 
     @property
     def _chooses(self) -> bool:

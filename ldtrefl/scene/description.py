@@ -53,6 +53,8 @@ MAX_OBJECTS = 1 << 20
 """The most objects in a scene."""
 MAX_LIGHTS = 64
 """The most lights in a scene."""
+MAX_SAMPLES = 1024
+"""The most samples of a pixel."""
 PARALLEL = 1e-9
 """Sine of the angle between the line of sight and ``up``: below it float64's rounding decides where right is."""
 NARROWEST = 1e-6
@@ -273,6 +275,8 @@ class Reflection:
     object's ``mirror`` says always sends one."""
     rough_limit: Fraction = 0.25
     """A surface that is rougher sends no ray: it shows the environment, blurred."""
+    samples: Annotated[Whole, Field(ge=1, le=MAX_SAMPLES)] | None = None
+    """The most samples of a pixel: it has one, and more where it differs from its neighbours; 4 if not given."""
 
 
 @refusing_in_one_line

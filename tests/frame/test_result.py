@@ -57,7 +57,7 @@ def test_a_whole_frame_has_radiance_at_its_pixels() -> None:
     pixels = wp.array([4, 1], dtype=wp.int32, device=device)
     radiance = wp.array([(1, 2, 3), (4, 5, 6)], dtype=wp.vec3, device=device)
     reflector = wp.array([0, 1, 0, 0, 1, 0], dtype=wp.uint8, device=device)
-    whole = WholeFrame((2, 3), pixels, radiance, reflector, None)
+    whole = WholeFrame((2, 3), pixels, radiance, reflector, None, None)
     expected = np.zeros((2, 3, 3), np.float32)
     expected[1, 1], expected[0, 1] = (1, 2, 3), (4, 5, 6)
     np.testing.assert_array_equal(whole.reflection(), expected)
@@ -91,7 +91,7 @@ def banded(
     for parts in bands():
         mask[rows_of(parts.gbuffer)] = parts.gbuffer.reflector_mask
     assert not mask[0].any() and mask[20].any() and mask[-10].any()
-    return BandedFrame(mask, bands)
+    return BandedFrame(mask, np.ones(mask.shape, np.uint16), bands)
 
 
 def test_bands_make_the_pictures_of_the_whole_image(monkeypatch: pytest.MonkeyPatch) -> None:

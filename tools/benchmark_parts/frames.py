@@ -29,7 +29,7 @@ def error_against_time(quick: bool, rounds: int) -> list[ErrorPoint]:
     size = (192, 128) if quick else (768, 512)
     full = (200, 25) if quick else (2000, 125)
     scene = knot_scene(full, *size)
-    truth = ldtrefl.render(scene, "bvh")
+    truth = ldtrefl.render(scene, "bvh", samples=1)
     mask = truth.reflector_mask
     curves: list[tuple[str, str, Scene, str, dict[str, Any]]] = [("bvh", "full mesh", scene, "bvh", {})]
     for columns, rows in [(40, 8), (100, 12), (200, 25), (600, 80)][: 2 if quick else 4]:
@@ -44,7 +44,9 @@ def error_against_time(quick: bool, rounds: int) -> list[ErrorPoint]:
     for resolution in (64, 256) if quick else (64, 128, 256, 512, 1024):
         curves.append(("envmap", f"{resolution}", scene, "envmap", {"resolution": resolution}))
     points: list[ErrorPoint] = []
-    renderers = [Renderer(where, method, skip=SKIPS_BUT_FRAMES, **options) for _, _, where, method, options in curves]
+    renderers = [
+        Renderer(where, method, skip=SKIPS_BUT_FRAMES, **options, samples=1) for _, _, where, method, options in curves
+    ]
     jobs = {str(i): renderer.render for i, renderer in enumerate(renderers)}
     times = timed_in_turn(jobs, max(2, rounds // 2))
     for i, (curve, label, _, _, _) in enumerate(curves):
@@ -73,7 +75,7 @@ def frame_stages(quick: bool, rounds: int) -> dict[str, dict[str, float]]:
             first: list[dict[str, float]] = []
             moved: list[dict[str, float]] = []
             for _ in range(rounds + 1):
-                renderer = Renderer(scene, method)
+                renderer = Renderer(scene, method, samples=1)
                 first.append(renderer.render().stats.seconds)
                 # A camera that moves: the maps stay, everything else is done again.
                 camera = dataclasses.replace(scene.camera, eye=(0.001 * len(first) - 0.5, -4.5, 0.8))
@@ -101,10 +103,10 @@ def error_targets(quick: bool, rounds: int) -> list[ErrorTarget]:
         found["three_dancers, very far"] = _farther(found["three_dancers"], 8.0)
     rows: list[ErrorTarget] = []
     for name, scene in found.items():
-        truth = ldtrefl.render(scene, "bvh")
+        truth = ldtrefl.render(scene, "bvh", samples=1)
         for search, error in itertools.product(("exact", "linear"), (None, 0.5, 2.0)):
-            Renderer(scene, "ldt", search=search, error=error).render()  # compiles
-            renderer = Renderer(scene, "ldt", search=search, error=error, skip=SKIPS_BUT_FRAMES)
+            Renderer(scene, "ldt", search=search, error=error, samples=1).render()  # compiles
+            renderer = Renderer(scene, "ldt", search=search, error=error, skip=SKIPS_BUT_FRAMES, samples=1)
             first = renderer.render()
             assert first.hits is not None and truth.hits is not None and renderer.gbuffer is not None
             pixels = metrics.reprojection_errors(first.hits, truth.hits, renderer.gbuffer)

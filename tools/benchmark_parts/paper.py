@@ -88,7 +88,7 @@ def paper_tables(quick: bool, rounds: int) -> PaperTables:
             continue
         ours = {}
         for search in ("linear", "exact"):
-            renderer = Renderer(scene, "ldt", search=search, skip=SKIPS_BUT_FRAMES)
+            renderer = Renderer(scene, "ldt", search=search, skip=SKIPS_BUT_FRAMES, samples=1)
             frames = [renderer.render().stats.seconds for _ in range(rounds + 1)][1:]
             reflecting = [frame["cull"] + frame["march"] + frame["shade"] for frame in frames]
             ours[search] = 1000 * statistics.median(reflecting)

@@ -118,7 +118,7 @@ def in_daylight(rows: int, *objects: ldtrefl.Object) -> ldtrefl.Scene:
 
 def compared(what: str, scene: ldtrefl.Scene) -> Outcome:
     """The maps' picture against the ray caster's."""
-    truth, renderer = ldtrefl.render(scene, "bvh"), ldtrefl.Renderer(scene, "ldt")
+    truth, renderer = ldtrefl.render(scene, "bvh", samples=1), ldtrefl.Renderer(scene, "ldt", samples=1)
     start = time.perf_counter()
     frame = renderer.render()
     outcome = Outcome(NAME, what, "balanced", seconds=time.perf_counter() - start)

@@ -87,11 +87,11 @@ def next_camera(pick: Pick, camera: ldtrefl.Camera) -> ldtrefl.Camera:
 def history(pick: Pick, by: str, picture: str, steps: int) -> Iterator[tuple[str, ldtrefl.Frame, ldtrefl.Frame]]:
     """(what was done, the frame, the same of a new renderer) step by step."""
     method, options = OPTIONS[by]
-    renderer = ldtrefl.Renderer(scene(pick, picture), method, **options)
+    renderer = ldtrefl.Renderer(scene(pick, picture), method, **options, samples=1)
     camera, done = renderer.scene.camera, "first"
     for _ in range(steps):
         frame = renderer.render(camera)
-        yield done, frame, ldtrefl.Renderer(renderer.scene, method, **options).render(camera)
+        yield done, frame, ldtrefl.Renderer(renderer.scene, method, **options, samples=1).render(camera)
         done = pick(("move", "move twice", "turn", "camera", "camera", "camera"))
         if done == "camera":
             camera = next_camera(pick, camera)
@@ -141,7 +141,7 @@ def wrong_frames(given: ldtrefl.Scene, by: str, renderers: Sequence[ldtrefl.Rend
     """(frames that are wrong, all) of threads that share ``renderers`` in turn, each with a camera of its own."""
     method, options = OPTIONS[by]
     cameras = [dataclasses.replace(given.camera, eye=eye, up=up) for eye, up in zip(EYES, UPS, strict=False)]
-    truths = [ldtrefl.Renderer(given, method, **options).render(camera) for camera in cameras]
+    truths = [ldtrefl.Renderer(given, method, **options, samples=1).render(camera) for camera in cameras]
     made: list[tuple[int, ldtrefl.Frame]] = []
 
     def work(k: int) -> None:
@@ -178,7 +178,7 @@ def threads_case(random: np.random.Generator, by: str, picture: str, rounds: int
     start = time.perf_counter()
     given, (method, options) = scene(picker(random), picture), OPTIONS[by]
     for count in (1, THREADS):
-        renderers = [ldtrefl.Renderer(given, method, **options) for _ in range(count)]
+        renderers = [ldtrefl.Renderer(given, method, **options, samples=1) for _ in range(count)]
         wrong, tried = wrong_frames(given, by, renderers, rounds)
         outcome.defects += wrong
         outcome.tried += tried

@@ -149,7 +149,7 @@ def threads_and_runs(pixels: int) -> list[Outcome]:
         for threads, slices in ((1, usual), (2, usual), (3, usual), (5, 7), (2, usual)):
             ldtrefl.set_threads(threads)
             cpu_threads.SLICES_PER_THREAD = slices
-            pictures.append(ldtrefl.render(scene, method, **options))
+            pictures.append(ldtrefl.render(scene, method, **options, samples=1))
         differ = [int((one.image != pictures[0].image).any(axis=2).sum()) for one in pictures[1:]]
         outcome = Outcome(NAME, "threads, slices, runs", by, tried=4 * pixels * pixels, wrong_hits=sum(differ))
         outcome.non_finite, outcome.limit = not_finite(pictures[0]), "the same bits"
@@ -159,7 +159,7 @@ def threads_and_runs(pixels: int) -> list[Outcome]:
     ldtrefl.set_threads()
     swapped = dataclasses.replace(scene, objects=scene.objects[::-1])
     for by, (method, options) in METHODS.items():
-        one, other = (ldtrefl.render(s, method, **options) for s in (scene, swapped))
+        one, other = (ldtrefl.render(s, method, **options, samples=1) for s in (scene, swapped))
         differ_by = np.abs(one.image - other.image).max(axis=2)
         outcome = Outcome(
             NAME, "objects in another order", by, tried=differ_by.size, wrong_hits=int((differ_by > OTHER_ORDER).sum())

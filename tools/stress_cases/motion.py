@@ -32,7 +32,7 @@ def run(rays: int, pictures: int) -> list[Outcome]:
         changes = {}
         for by, (method, options) in METHODS.items():
             start = time.perf_counter()
-            renderer = ldtrefl.Renderer(scene(segments, 0, pictures), method, **options)
+            renderer = ldtrefl.Renderer(scene(segments, 0, pictures), method, **options, samples=1)
             before, change, broken = None, [], 0
             for i in range(FRAMES):
                 frame = renderer.render(camera=scene(segments, i, pictures).camera)

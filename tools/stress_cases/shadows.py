@@ -41,7 +41,7 @@ def run(rays: int, pictures: int) -> list[Outcome]:
     for what, (scene, size) in scenes.items():
         for by, (method, options) in METHODS.items():
             start = time.perf_counter()
-            image = ldtrefl.render(scene, method, **options).image[..., 0]
+            image = ldtrefl.render(scene, method, **options, samples=1).image[..., 0]
             outcome = Outcome(NAME, what, by, seconds=time.perf_counter() - start)
             outcomes.append(judge_strip(outcome, image, points_on_floor(scene, size)))
     for shape, segments in (("torus_knot", (2000, 125)), ("sphere", (1000, 500)), ("torus", (1000, 400))):
@@ -98,9 +98,9 @@ def judge_dense(shape: str, segments: tuple[int, int], pixels: int) -> Outcome:
         lights=(Light(kind="directional", direction=(0.9, 0.3, -0.3), radiance=(1, 1, 1)),),
         objects=(Object(shape=shape, params={"segments": segments}),),
     )
-    truth = ldtrefl.render(scene, "bvh").image[..., 0]
+    truth = ldtrefl.render(scene, "bvh", samples=1).image[..., 0]
     start = time.perf_counter()
-    image = ldtrefl.render(scene, "ldt").image[..., 0]
+    image = ldtrefl.render(scene, "ldt", samples=1).image[..., 0]
     outcome = Outcome(NAME, f"a dense {shape} in its own shadow", "balanced", tried=image.size)
     outcome.seconds = time.perf_counter() - start
     outcome.defects = int((np.abs(image - truth) > SEEN).sum())

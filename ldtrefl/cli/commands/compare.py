@@ -15,6 +15,7 @@ from ldtrefl.cli.options import (
     Memory,
     Mirror,
     On,
+    Samples,
     SceneFile,
     Size,
     Threads,
@@ -34,7 +35,7 @@ from ldtrefl.frame.first_frame import foresee_a_frame
 from ldtrefl.frame.result import Frame
 from ldtrefl.methods import find_method
 from ldtrefl.renderer import Renderer
-from ldtrefl.scene.description import Scene
+from ldtrefl.scene.description import MAX_SAMPLES, Scene
 
 PLACE_IN_HELP = 20
 
@@ -60,6 +61,11 @@ def compare(
     up: Up = None,
     mirror: Mirror = None,
     size: Size = None,
+    samples: Samples = None,
+    reference_samples: Annotated[
+        int | None,
+        typer.Option(min=1, max=MAX_SAMPLES, help="The same of the truth; as many as the others if not given."),
+    ] = None,
     lenient: Lenient = False,
     device: Device = None,
     threads: Threads = None,
@@ -70,6 +76,9 @@ def compare(
     foresee_a_frame(device)
     names = [name.strip() for name in methods.split(",") if name.strip()]
     options = _options_by_method(settings, [reference, *names])
+    for name, count in [*((name, samples) for name in options), (reference, reference_samples)]:
+        if count is not None:
+            options[name] = {**options[name], "samples": count}
     folder = writable_folder(output or Path(scene.stem + "-compare"), make=True)
     loaded = scene_of(scene, on, up, mirror, size, lenient)
     rows: dict[str, Row] = {}

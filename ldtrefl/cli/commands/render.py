@@ -20,6 +20,7 @@ from ldtrefl.cli.options import (
     Memory,
     Mirror,
     On,
+    Samples,
     SceneFile,
     Size,
     Threads,
@@ -54,6 +55,7 @@ def render(
     up: Up = None,
     mirror: Mirror = None,
     size: Size = None,
+    samples: Samples = None,
     lenient: Lenient = False,
     scene_file: Annotated[
         Path | None,
@@ -85,7 +87,7 @@ def render(
         loaded = scene_of(scene, on, up, mirror, size, lenient)
         if scene_file is not None:
             save_scene(scene_file, loaded, include_of(scene, up_axis_of(scene, up)))
-        options = parsed_settings(settings)
+        options = parsed_settings(settings) | ({} if samples is None else {"samples": samples})
         # Before they are passed on by name: one may be called as a parameter of Renderer is.
         find_method(loaded.reflection.method if method is None else method).configured(options)
         with progress_bar():

@@ -1,0 +1,231 @@
+"""Antialiasing: more samples where the image needs them, and their mean by a filter.
+
+An image is first made with a sample at each pixel's centre. Pixels that differ from a neighbour (``contrast.py``) are
+sampled at more places (``sample_pattern.py``); of many samples the first few are taken first, and the others only where
+those differ. A pixel that is sampled once counts as though all its samples were alike. The filter then blends each
+sample into the pixels about it; what has no sampled neighbour stays as it is.
+
+The order of all sums is fixed, so no bit depends on the number of threads.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+
+from ldtrefl.device import launch
+from ldtrefl.frame.contrast import groups_of_contrast, pixels_of_contrast
+from ldtrefl.frame.history import Antialiased, FrameParts
+from ldtrefl.frame.pixel_order import pixels_in_blocks
+from ldtrefl.frame.sample_pattern import Level, levels, places
+
+TOGETHER = 1 << 18
+"""Samples that are traced together: enough for all threads, and their rays take less than 0.1 GB."""
+
+BEYOND = 2
+"""Rows beyond a band that its antialiasing looks at: the next one's samples, and what those are chosen by."""
+
+NEIGHBOURS = wp.constant(9)
+"""Pixels that a sample counts in."""
+
+RadianceAt = Callable[[wp.array], wp.array]
+"""(n,) vec2d points of a band in its pixels -> (n,) vec3 the radiance seen there."""
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """How often pixels are sampled."""
+
+    samples: int
+    """The most of a pixel."""
+    adaptive: bool
+    """Whether pixels that do not differ from their neighbours are sampled once."""
+
+
+@launch.kernel
+def place_samples(
+    first: int,
+    # In:
+    pixels: wp.array(dtype=wp.int32),
+    width: int,
+    offsets: wp.array(dtype=wp.vec2d),
+    # Out:
+    place_out: wp.array(dtype=wp.vec2d),
+):
+    """Place the samples of one pixel."""
+    i, count = first + wp.tid(), offsets.shape[0]
+    half, pixel = wp.float64(0.5), pixels[i]
+    centre = wp.vec2d(wp.float64(pixel % width) + half, wp.float64(pixel / width) + half)
+    for k in range(count):
+        place_out[count * i + k] = centre + offsets[k]
+
+
+@launch.kernel
+def weigh_samples(
+    first: int,
+    # In:
+    pixels: wp.array(dtype=wp.int32),
+    numbers: wp.array(dtype=wp.int32),  # of these pixels among all that are sampled more than once
+    centre: wp.array(dtype=wp.vec3),  # radiance of every pixel's first sample
+    few: wp.array(dtype=wp.vec3),  # of the next samples, in a row for each that is sampled more than once
+    many: wp.array(dtype=wp.vec3),  # of the last ones, in a row for each of these pixels
+    weights: wp.array(dtype=float),
+    # Out: NEIGHBOURS for each pixel that is sampled more than once
+    shares_out: wp.array(dtype=wp.vec3),
+):
+    """Sum up what the samples of one pixel count in each of the pixels about it."""
+    i, samples = first + wp.tid(), weights.shape[0] / NEIGHBOURS
+    number, later = numbers[i], many.shape[0] / pixels.shape[0]
+    soon = samples - 1 - later
+    for neighbour in range(NEIGHBOURS):
+        row = neighbour * samples
+        share = weights[row] * centre[pixels[i]]
+        for k in range(soon):
+            share += weights[row + 1 + k] * few[number * soon + k]
+        for k in range(later):
+            share += weights[row + 1 + soon + k] * many[i * later + k]
+        shares_out[number * NEIGHBOURS + neighbour] = share
+
+
+@launch.kernel
+def filter_pixels(
+    first: int,
+    # In:
+    pixels: wp.array(dtype=wp.int32),
+    width: int,
+    number_of: wp.array(dtype=wp.int32),  # of each pixel among those that are sampled more than once, -1 of others
+    centre: wp.array(dtype=wp.vec3),
+    shares: wp.array(dtype=wp.vec3),
+    weights: wp.array(dtype=float),  # of a whole pixel, by neighbour
+    # Out: of these pixels
+    radiance_out: wp.array(dtype=wp.vec3),
+):
+    """Sum up what the samples of all pixels about one count in it."""
+    pixel, height = pixels[first + wp.tid()], centre.shape[0] / width
+    x, y = pixel % width, pixel / width
+    total, weight = wp.vec3(0.0), float(0.0)
+    for neighbour in range(NEIGHBOURS):
+        other_x, other_y = x + neighbour % 3 - 1, y + neighbour / 3 - 1
+        if other_x >= 0 and other_x < width and other_y >= 0 and other_y < height:
+            other = other_y * width + other_x
+            if number_of[other] >= 0:
+                total += shares[number_of[other] * NEIGHBOURS + neighbour]
+            else:
+                total += weights[neighbour] * centre[other]
+            weight += weights[neighbour]
+    radiance_out[first + wp.tid()] = total / weight
+
+
+@launch.kernel
+def put_pixels(
+    first: int,
+    # In:
+    pixels: wp.array(dtype=wp.int32),
+    radiance: wp.array(dtype=wp.vec3),
+    # Out:
+    image_out: wp.array(dtype=wp.vec3),
+):
+    """Write the radiance of one of these pixels into the image."""
+    image_out[pixels[first + wp.tid()]] = radiance[first + wp.tid()]
+
+
+class _Samples:
+    """The samples of a band's pixels."""
+
+    def __init__(self, sampling: Sampling, shape: tuple[int, int], centre: wp.array, radiance_at: RadianceAt) -> None:
+        self._levels = levels(sampling.samples)
+        self._offsets = places(sampling.samples)
+        self._adaptive = sampling.adaptive
+        self._width, self._device = shape[1], centre.device
+        self._centre, self._radiance_at = centre, radiance_at
+
+    def shares(self, pixels: np.ndarray, counts: np.ndarray) -> wp.array:
+        """(m * NEIGHBOURS,) vec3: what (m,) ``pixels`` count in those about them. ``counts``, (all pixels,), is filled
+        in where they are sampled."""
+        shares = wp.empty(len(pixels) * int(NEIGHBOURS), dtype=wp.vec3, device=self._device)
+        at_once = max(1, TOGETHER // self._levels[-1].samples)
+        for begin in range(0, len(pixels), at_once):
+            part = pixels[begin : begin + at_once]
+            self._sample(part, counts, shares[begin * int(NEIGHBOURS) : (begin + len(part)) * int(NEIGHBOURS)])
+        return shares
+
+    def _sample(self, pixels: np.ndarray, counts: np.ndarray, shares: wp.array) -> None:
+        """Sample pixels at the second level, and those that need it at the last."""
+        first, last = self._levels[1], self._levels[-1]
+        if not self._adaptive:
+            first = last
+        every = np.arange(len(pixels))
+        few = self._traced(pixels, 1, first.samples)
+        nothing = wp.empty(0, dtype=wp.vec3, device=self._device)
+        counts[pixels] = first.samples
+        self._weigh(pixels, every, few, nothing, first, shares)
+        if first is not last:
+            varied = groups_of_contrast(few, first.samples - 1)
+            if len(varied):
+                counts[pixels[varied]] = last.samples
+                many = self._traced(pixels[varied], first.samples, last.samples)
+                self._weigh(pixels[varied], varied, few, many, last, shares)
+
+    def _traced(self, pixels: np.ndarray, begin: int, end: int) -> wp.array:
+        """(m * (end - begin),) vec3: the samples from ``begin`` to ``end`` of (m,) pixels."""
+        offsets = wp.array(self._offsets[begin:end], dtype=wp.vec2d, device=self._device)
+        place = wp.empty(len(pixels) * (end - begin), dtype=wp.vec2d, device=self._device)
+        launch.launch(place_samples, len(pixels), [self._on_device(pixels), self._width, offsets, place], self._device)
+        return self._radiance_at(place)
+
+    def _weigh(
+        self, pixels: np.ndarray, numbers: np.ndarray, few: wp.array, many: wp.array, level: Level, shares: wp.array
+    ) -> None:
+        weights = wp.array(level.weights.ravel(), dtype=float, device=self._device)
+        inputs = [self._on_device(pixels), self._on_device(numbers), self._centre, few, many, weights, shares]
+        launch.launch(weigh_samples, len(pixels), inputs, self._device)
+
+    def _on_device(self, numbers: np.ndarray) -> wp.array:
+        return wp.array(numbers.astype(np.int32), dtype=wp.int32, device=self._device)
+
+
+def _with_neighbours(pixels: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    """(n,) int32: these pixels and all that touch one of them, block by block."""
+    inner = np.zeros(shape[0] * shape[1], bool)
+    inner[pixels] = True
+    mask = np.pad(inner.reshape(shape), 1)
+    rows = mask[:-2] | mask[1:-1] | mask[2:]
+    return pixels_in_blocks(np.ascontiguousarray(rows[:, :-2] | rows[:, 1:-1] | rows[:, 2:]))
+
+
+def antialiased(parts: FrameParts, centre: wp.array, sampling: Sampling, radiance_at: RadianceAt) -> Antialiased:
+    """The pixels of a band that more samples change.
+
+    Args:
+        parts: the band, sampled at the centres of its pixels.
+        centre: (pixels,) vec3, its radiance.
+        radiance_at: traces more samples.
+    """
+    gbuffer, device = parts.gbuffer, centre.device
+    shape = gbuffer.shape
+    counts = np.ones(gbuffer.pixel_count, np.uint16)
+    if sampling.adaptive:
+        pixels = pixels_of_contrast(gbuffer, parts.reflected.hits, centre)
+    else:
+        pixels = pixels_in_blocks(np.ones(shape, bool))
+    if sampling.samples == 1 or len(pixels) == 0:
+        empty = np.empty(0, np.int32)
+        nothing = wp.array(empty, dtype=wp.int32, device=device), wp.empty(0, dtype=wp.vec3, device=device)
+        return Antialiased(*nothing, counts.reshape(shape))
+    shares = _Samples(sampling, shape, centre, radiance_at).shares(pixels, counts)
+    number_of = np.full(gbuffer.pixel_count, -1, np.int32)
+    number_of[pixels] = np.arange(len(pixels), dtype=np.int32)
+    touched = wp.array(_with_neighbours(pixels, shape), dtype=wp.int32, device=device)
+    weights = wp.array(levels(sampling.samples)[0].weights.ravel(), dtype=float, device=device)
+    radiance = wp.empty(touched.shape[0], dtype=wp.vec3, device=device)
+    inputs = [touched, shape[1], wp.array(number_of, dtype=wp.int32, device=device), centre, shares, weights, radiance]
+    launch.launch(filter_pixels, touched.shape[0], inputs, device)
+    return Antialiased(touched, radiance, counts.reshape(shape))
+
+
+def put_into(found: Antialiased, image: wp.array) -> None:
+    """Write what was found into an image that was sampled at the centres of its pixels."""
+    launch.launch(put_pixels, found.pixels.shape[0], [found.pixels, found.radiance, image], image.device)
