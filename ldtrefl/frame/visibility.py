@@ -96,8 +96,7 @@ def of_its_group(
 
 @wp.func
 def leads_on(objects: wp.array(dtype=ObjectRecord), looks: Looks, gbuffer: GBufferView, i: int, reflects: int) -> int:
-    """1 if a ray may go on, mirrored or straight, from what a pixel sees of an object that ``reflects`` in this way; else
-    0."""
+    """1 if a ray may go on, mirrored or straight, from what a pixel sees of an object that ``reflects`` so, else 0."""
     if reflects != 2:
         return reflects
     index, triangle = gbuffer.object[i], gbuffer.triangle[i]
