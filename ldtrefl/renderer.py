@@ -19,7 +19,7 @@ from ldtrefl.base import budget
 from ldtrefl.base.errors import InputError
 from ldtrefl.device import build_ahead, launch
 from ldtrefl.device.stats import Stats
-from ldtrefl.frame.antialiasing import BEYOND, antialiased, put_into
+from ldtrefl.frame.antialiasing import BEYOND, antialiased, filtered
 from ldtrefl.frame.camera_shading import shade_gbuffer
 from ldtrefl.frame.composite import composed
 from ldtrefl.frame.first_frame import OF_EVERY_SCENE, OF_SAMPLES
@@ -279,7 +279,7 @@ class Renderer:
                 if known is None:
                     seen = functools.partial(self._seen, gbuffer, stats)
                     known = antialiased(parts, radiance, self._sampling, seen)
-                put_into(known, radiance)
+                radiance = filtered(known, radiance, self._sampling)
             stats.count("samples", int(known.counts.sum()))
         return dataclasses.replace(parts, antialiased=known), radiance.numpy().reshape(*gbuffer.shape, 3)
 

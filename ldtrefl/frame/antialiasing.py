@@ -3,7 +3,8 @@
 An image is first made with a sample at each pixel's centre. Pixels that differ from a neighbour (``contrast.py``) are
 sampled at more places (``sample_pattern.py``); of many samples the first few are taken first, and the others only where
 those differ. A pixel that is sampled once counts as though all its samples were alike. The filter then blends each
-sample into the pixels about it; what has no sampled neighbour stays as it is.
+sample into the pixels about it. Where no pixel is sampled more than once that is a blend of nine pixels, made for as
+many at once as a vector has lanes, in C++ (``smooth.h``).
 
 The order of all sums is fixed, so no bit depends on the number of threads.
 """
@@ -17,6 +18,7 @@ import numpy as np
 import warp as wp
 
 from ldtrefl.device import launch
+from ldtrefl.device.native_sources import native_body
 from ldtrefl.frame.contrast import groups_of_contrast, pixels_of_contrast
 from ldtrefl.frame.history import Antialiased, FrameParts
 from ldtrefl.frame.pixel_order import pixels_in_blocks
@@ -30,6 +32,12 @@ BEYOND = 2
 
 NEIGHBOURS = wp.constant(9)
 """Pixels that a sample counts in."""
+
+FILES = ("device/vectors.h", "frame/smooth.h")
+BLEND = """
+const int begin = y * width + 1;
+Smooth::blend(&centre.data[begin][0], 3 * width, 3 * (width - 2), weights.data, &image_out.data[begin][0]);
+"""
 
 RadianceAt = Callable[[wp.array], wp.array]
 """(n,) vec2d points of a band in its pixels -> (n,) vec3 the radiance seen there."""
@@ -119,6 +127,34 @@ def filter_pixels(
     radiance_out[first + wp.tid()] = total / weight
 
 
+@wp.func_native(native_body({}, FILES, BLEND))
+def blend_row(
+    centre: wp.array(dtype=wp.vec3),
+    width: int,
+    y: int,
+    weights: wp.array(dtype=float),
+    image_out: wp.array(dtype=wp.vec3),
+):
+    """Blend the pixels of a row that have neighbours on all sides."""
+    ...
+
+
+@launch.kernel
+def blend_pixels(
+    first: int,
+    # In:
+    width: int,
+    centre: wp.array(dtype=wp.vec3),
+    weights: wp.array(dtype=float),  # of a whole pixel, by neighbour
+    # Out:
+    image_out: wp.array(dtype=wp.vec3),
+):
+    """Blend each pixel of one row with its neighbours, but for those at the image's border."""
+    y = first + wp.tid()
+    if y > 0 and (y + 2) * width <= centre.shape[0] and width > 2:
+        blend_row(centre, width, y, weights, image_out)
+
+
 @launch.kernel
 def put_pixels(
     first: int,
@@ -187,13 +223,15 @@ class _Samples:
         return wp.array(numbers.astype(np.int32), dtype=wp.int32, device=self._device)
 
 
-def _with_neighbours(pixels: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-    """(n,) int32: these pixels and all that touch one of them, block by block."""
+def _filtered_apart(pixels: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    """(n,) int32: these pixels, all that touch one of them, and those at the image's border, block by block."""
     inner = np.zeros(shape[0] * shape[1], bool)
     inner[pixels] = True
     mask = np.pad(inner.reshape(shape), 1)
     rows = mask[:-2] | mask[1:-1] | mask[2:]
-    return pixels_in_blocks(np.ascontiguousarray(rows[:, :-2] | rows[:, 1:-1] | rows[:, 2:]))
+    apart = np.ascontiguousarray(rows[:, :-2] | rows[:, 1:-1] | rows[:, 2:])
+    apart[0] = apart[-1] = apart[:, 0] = apart[:, -1] = True
+    return pixels_in_blocks(apart)
 
 
 def antialiased(parts: FrameParts, centre: wp.array, sampling: Sampling, radiance_at: RadianceAt) -> Antialiased:
@@ -202,30 +240,36 @@ def antialiased(parts: FrameParts, centre: wp.array, sampling: Sampling, radianc
     Args:
         parts: the band, sampled at the centres of its pixels.
         centre: (pixels,) vec3, its radiance.
+        sampling: more than one sample.
         radiance_at: traces more samples.
     """
     gbuffer, device = parts.gbuffer, centre.device
     shape = gbuffer.shape
     counts = np.ones(gbuffer.pixel_count, np.uint16)
     if sampling.adaptive:
-        pixels = pixels_of_contrast(gbuffer, parts.reflected.hits, centre)
+        pixels = pixels_of_contrast(gbuffer, parts.reflected.hits, centre, sampling.samples)
     else:
         pixels = pixels_in_blocks(np.ones(shape, bool))
-    if sampling.samples == 1 or len(pixels) == 0:
-        empty = np.empty(0, np.int32)
-        nothing = wp.array(empty, dtype=wp.int32, device=device), wp.empty(0, dtype=wp.vec3, device=device)
-        return Antialiased(*nothing, counts.reshape(shape))
     shares = _Samples(sampling, shape, centre, radiance_at).shares(pixels, counts)
     number_of = np.full(gbuffer.pixel_count, -1, np.int32)
     number_of[pixels] = np.arange(len(pixels), dtype=np.int32)
-    touched = wp.array(_with_neighbours(pixels, shape), dtype=wp.int32, device=device)
-    weights = wp.array(levels(sampling.samples)[0].weights.ravel(), dtype=float, device=device)
-    radiance = wp.empty(touched.shape[0], dtype=wp.vec3, device=device)
-    inputs = [touched, shape[1], wp.array(number_of, dtype=wp.int32, device=device), centre, shares, weights, radiance]
-    launch.launch(filter_pixels, touched.shape[0], inputs, device)
-    return Antialiased(touched, radiance, counts.reshape(shape))
+    apart = wp.array(_filtered_apart(pixels, shape), dtype=wp.int32, device=device)
+    radiance = wp.empty(apart.shape[0], dtype=wp.vec3, device=device)
+    numbers = wp.array(number_of, dtype=wp.int32, device=device)
+    inputs = [apart, shape[1], numbers, centre, shares, _weights(sampling, device), radiance]
+    launch.launch(filter_pixels, apart.shape[0], inputs, device)
+    return Antialiased(apart, radiance, counts.reshape(shape))
 
 
-def put_into(found: Antialiased, image: wp.array) -> None:
-    """Write what was found into an image that was sampled at the centres of its pixels."""
-    launch.launch(put_pixels, found.pixels.shape[0], [found.pixels, found.radiance, image], image.device)
+def filtered(found: Antialiased, centre: wp.array, sampling: Sampling) -> wp.array:
+    """(pixels,) vec3: the whole image, from what was found of it and its radiance at the pixels' centres."""
+    height, width = found.counts.shape
+    image, device = wp.empty_like(centre), centre.device
+    launch.launch(blend_pixels, height, [width, centre, _weights(sampling, device), image], device)
+    launch.launch(put_pixels, found.pixels.shape[0], [found.pixels, found.radiance, image], device)
+    return image
+
+
+def _weights(sampling: Sampling, device: wp.Device) -> wp.array:
+    """(NEIGHBOURS,) float: of a pixel that is sampled once."""
+    return wp.array(levels(sampling.samples)[0].weights.ravel(), dtype=float, device=device)

@@ -10,6 +10,8 @@ done in C++ (``contrast.h``).
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import warp as wp
 
@@ -19,22 +21,23 @@ from ldtrefl.frame.bounce_hits import FirstHits
 from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.pixel_order import pixels_in_blocks
 
-WITHIN = 0.03
-"""Difference on that scale from the mean of two neighbours that see the same objects."""
+WITHIN = 0.06
+"""Difference on that scale from the mean of two neighbours that see the same objects, over the root of the samples that
+a pixel may have: who asks for many wants small differences to count."""
 
-AT_EDGE = 0.02
+AT_EDGE = 0.04
 """The same from a neighbour that sees others."""
 
-VARIED = 0.06
+VARIED = 0.08
 """The same between samples of a pixel."""
 
-CONSTANTS: dict[str, float | int] = {"WITHIN": WITHIN, "AT_EDGE": AT_EDGE, "VARIED": VARIED}
+CONSTANTS: dict[str, float | int] = {"VARIED": VARIED}
 FILES = ("device/vectors.h", "frame/contrast.h")
 
 MARK = """
 const float* const row = &radiance.data[begin][0];
 const bool has_above = begin > 0, has_below = begin + width < (int)radiance.shape[0];
-Contrast::mark_row(row, seen.data + begin, width, has_above, has_below, WITHIN, AT_EDGE, marked_out.data + begin);
+Contrast::mark_row(row, seen.data + begin, width, has_above, has_below, within, at_edge, marked_out.data + begin);
 """
 MARK_GROUP = """
 bool varies = false;
@@ -67,6 +70,8 @@ def mark_row(
     seen: wp.array(dtype=wp.int32),
     begin: int,
     width: int,
+    within: float,
+    at_edge: float,
     marked_out: wp.array(dtype=wp.uint8),
 ):
     """Mark the pixels from ``begin`` on, a row of them, that differ from their neighbours."""
@@ -86,11 +91,13 @@ def mark_contrast(
     width: int,
     radiance: wp.array(dtype=wp.vec3),
     seen: wp.array(dtype=wp.int32),
+    within: float,
+    at_edge: float,
     # Out:
     marked_out: wp.array(dtype=wp.uint8),
 ):
     """Mark the pixels of one row that differ from their neighbours."""
-    mark_row(radiance, seen, width * (first + wp.tid()), width, marked_out)
+    mark_row(radiance, seen, width * (first + wp.tid()), width, within, at_edge, marked_out)
 
 
 @launch.kernel
@@ -115,17 +122,19 @@ def objects_seen(gbuffer: GBuffer, hits: FirstHits | None) -> wp.array:
     return seen
 
 
-def pixels_of_contrast(gbuffer: GBuffer, hits: FirstHits | None, radiance: wp.array) -> np.ndarray:
+def pixels_of_contrast(gbuffer: GBuffer, hits: FirstHits | None, radiance: wp.array, samples: int) -> np.ndarray:
     """(n,) int32: the pixels that differ from a neighbour, block by block.
 
     Args:
         gbuffer: what they see.
         hits: what is reflected there, if the method tells.
         radiance: (pixels,) vec3.
+        samples: how many a pixel may have, 2 or more.
     """
     height, width = gbuffer.shape
     marked = wp.empty(height * width, dtype=wp.uint8, device=radiance.device)
-    inputs = [width, radiance, objects_seen(gbuffer, hits), marked]
+    fewer = 1.0 / math.sqrt(samples)
+    inputs = [width, radiance, objects_seen(gbuffer, hits), fewer * WITHIN, fewer * AT_EDGE, marked]
     launch.launch(mark_contrast, height, inputs, radiance.device)
     return pixels_in_blocks(marked.numpy().view(bool).reshape(height, width))
 

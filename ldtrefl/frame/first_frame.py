@@ -6,7 +6,7 @@ from __future__ import annotations
 import warp as wp
 
 from ldtrefl.device import build_ahead, launch
-from ldtrefl.frame.antialiasing import filter_pixels, place_samples, put_pixels, weigh_samples
+from ldtrefl.frame.antialiasing import blend_pixels, filter_pixels, place_samples, put_pixels, weigh_samples
 from ldtrefl.frame.bounces import shade_hits_kernel
 from ldtrefl.frame.camera_shading import shade_pixels_kernel, shade_reflectors_kernel
 from ldtrefl.frame.composite import add_reflection, copy_pixels
@@ -37,6 +37,7 @@ OF_SAMPLES = (
     mix_in_objects,
     place_samples,
     put_pixels,
+    blend_pixels,
 )
 """What samples pixels more than once."""
 

@@ -29,7 +29,7 @@ from ldtrefl.world.device_scene import DeviceScene
 
 @dataclass(frozen=True, eq=False)
 class Antialiased:
-    """Pixels that have been sampled more than once, or have such neighbours."""
+    """Pixels that have been sampled more than once or have such neighbours, and those at the border of the image."""
 
     pixels: wp.array
     """(n,) int32."""

@@ -1,12 +1,14 @@
 """Where a pixel is sampled, and how much each sample counts in the pixels about it.
 
-Samples lie at fixed places within a pixel, the same in all pixels: the additive sequence of M. Roberts, "The
-Unreasonable Effectiveness of Quasirandom Sequences" (2018), which spreads well however many are taken. The first is
-the pixel's centre. The image is the mean of the samples, weighted by a Gaussian about the pixel's centre, of standard
-deviation 0.375 pixels along each axis, that ends at 1.5 pixels: so a pixel sees samples of its eight neighbours, too.
+Samples lie at fixed places within a pixel, the same in all pixels: the centre, then three in a triangle about it if
+their number is even, then pairs on opposite sides, so that the image is not moved. Pairs are spread by the additive
+sequence of M. Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences" (2018).
 
-A pixel has a *level*: it is sampled at its centre alone, or at the first few of all places, or at all of them. Where it
-is sampled at few places, each stands for those that are nearest to it.
+The image is a mean with the weights of a Gaussian about the pixel's centre, of standard deviation 0.375 pixels along
+each axis, that ends at 1.5 pixels: so a pixel sees samples of its eight neighbours, too. A sample stands for the part
+of its pixel that is nearest to it.
+
+A pixel has a *level*: it is sampled at its centre alone, or at the first few places, or at all of them.
 """
 
 from __future__ import annotations
@@ -19,19 +21,33 @@ import numpy as np
 STEP = np.array([0.7548776662466927, 0.5698402909980532])
 """1 / p and 1 / p^2, where p is the root of p^3 = p + 1 (Roberts)."""
 
+TRIANGLE_RADIUS, TRIANGLE_ANGLE = 0.38, np.radians(15.0)
+"""Of the three samples about the centre: no two of them, nor the centre, lie beside each other along an axis."""
+
 DEVIATION = 0.375
 """Of the Gaussian, in pixels."""
 
 RADIUS = 1.5
 """Pixels from its middle at which it ends, along each axis."""
 
-FEW = 4
-"""Samples that a pixel gets first, if it may have more."""
+CELLS = 64
+"""Parts of a pixel along each axis by which it is shared out among its samples."""
 
 
 def places(samples: int) -> np.ndarray:
-    """(samples, 2) float64 places within a pixel, right and down from its centre, each from -0.5 to below 0.5."""
-    return (0.5 + np.arange(samples)[:, None] * STEP) % 1.0 - 0.5
+    """(samples, 2) float64 places within a pixel, right and down from its centre, each from -0.5 to 0.5."""
+    angles = TRIANGLE_ANGLE + np.arange(3) * 2.0 * np.pi / 3.0
+    triangle = TRIANGLE_RADIUS * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    about = triangle if samples % 2 == 0 else np.empty((0, 2))
+    pairs = max(0, -(-(samples - 1 - len(about)) // 2))
+    one = (0.5 + np.arange(pairs)[:, None] * STEP) % 1.0 * (0.5, 1.0) - (0.0, 0.5)
+    both = np.stack([one, -one], axis=1).reshape(-1, 2)
+    return np.concatenate([np.zeros((1, 2)), about, both])[:samples]
+
+
+def first_few(samples: int) -> int:
+    """How many samples a pixel gets first, if it may have so many: those that lie evenly about the centre."""
+    return min(4 if samples % 2 == 0 else 5, samples)
 
 
 def filter_weight(offset: np.ndarray) -> np.ndarray:
@@ -54,19 +70,15 @@ class Level:
 @functools.lru_cache(maxsize=8)
 def levels(samples: int) -> tuple[Level, ...]:
     """The levels that pixels may have, the fewest samples first; ``samples`` is how many the last one has."""
-    counts = sorted({1, min(FEW, samples), samples})
-    every = places(samples)
-    rows = np.stack(np.meshgrid((-1, 0, 1), (-1, 0, 1), indexing="xy"), axis=-1).reshape(9, 1, 2)
-    weights = filter_weight(rows + every)
+    every, few = places(samples), first_few(samples)
+    along = (np.arange(CELLS) + 0.5) / CELLS - 0.5
+    cells = np.stack(np.meshgrid(along, along), axis=-1).reshape(-1, 2)
+    rows = np.stack(np.meshgrid((-1, 0, 1), (-1, 0, 1)), axis=-1).reshape(9, 1, 2)
+    weights = filter_weight(rows + cells)
     weights /= weights.sum()
-    return tuple(Level(count, _summed(weights, every, count).astype(np.float32)) for count in counts)
-
-
-def _summed(weights: np.ndarray, every: np.ndarray, count: int) -> np.ndarray:
-    """(9, count): the weights of all places, added up at the nearest of the first ``count``."""
-    apart = every[:, None] - every[None, :count]
-    nearest = np.square(apart).sum(axis=-1).argmin(axis=1)
-    summed = np.zeros((len(weights), count))
-    for place, first in enumerate(nearest):
-        summed[:, first] += weights[:, place]
-    return summed
+    found = []
+    for count in sorted({1, few, samples}):
+        nearest = np.stack([np.square(cells - place).sum(axis=1) for place in every[:count]]).argmin(axis=0)
+        shared = np.stack([np.bincount(nearest, row, minlength=count) for row in weights])
+        found.append(Level(count, shared.astype(np.float32)))
+    return tuple(found)

@@ -23,7 +23,7 @@ def marked(image: np.ndarray, objects: np.ndarray) -> np.ndarray:
     gbuffer = GBuffer(on, camera, view, whole_image(camera))
     radiance = wp.array(image.reshape(-1, 3).astype(np.float32), dtype=wp.vec3, device=on.device)
     found = np.zeros(HEIGHT * WIDTH, bool)
-    pixels = pixels_of_contrast(gbuffer, None, radiance)
+    pixels = pixels_of_contrast(gbuffer, None, radiance, 4)
     found[pixels] = True
     assert len(np.unique(pixels)) == len(pixels)
     return found.reshape(HEIGHT, WIDTH)
@@ -54,9 +54,9 @@ def test_what_changes_steadily_is_left_alone() -> None:
 
 
 def test_at_the_edge_of_an_object_less_is_enough() -> None:
-    step = 1.2 * AT_EDGE * 2 * np.sqrt(0.5) * 1.5**1.5
+    step = 1.2 * 0.5 * AT_EDGE * 2 * np.sqrt(0.5) * 1.5**1.5
     image = grey(np.where(X < 64, 0.5, 0.5 + step))
-    assert 0.5 * step < WITHIN * 2 * np.sqrt(0.5) * 1.5**1.5  # within an object: too little
+    assert 0.5 * step < 0.5 * WITHIN * 2 * np.sqrt(0.5) * 1.5**1.5  # within an object: too little
     assert not marked(image, ALIKE).any()
     edge = np.where(X < 64, 0, 1) + ALIKE
     assert np.flatnonzero(marked(image, edge).all(axis=0)).tolist() == [63, 64]
