@@ -1,6 +1,7 @@
 """What a scene file says: camera, environment, lights and objects, their meshes and materials, and procedural shapes.
 
     description.py      the dataclasses of a scene; load.py reads them from a file, toml_text.py the TOML in it
+    environment.py      what is seen where nothing is; presets/ makes sun and sky, and a studio
     placement.py        where an object stands; layout.py has all of a scene, places.py has one stand in many places,
                         standing.py on what is under it
     mesh_scene.py       a mesh file as a scene; composed.py puts objects on a stage (stages.py, with subject.py and

@@ -38,9 +38,9 @@ from ldtrefl.base.checked import (
 )
 from ldtrefl.base.errors import InputError, printable, unknown_name
 from ldtrefl.base.notices import warn_once
-from ldtrefl.files.picture_reading import stored_picture
 from ldtrefl.files.stored_picture import StoredPicture
 from ldtrefl.scene import shapes
+from ldtrefl.scene.environment import Environment
 from ldtrefl.scene.layout import Layout
 from ldtrefl.scene.material import Material
 from ldtrefl.scene.mesh import Mesh
@@ -55,6 +55,8 @@ MAX_LIGHTS = 64
 """The most lights in a scene."""
 MAX_SAMPLES = 1024
 """The most samples of a pixel."""
+AMBIENT = (0.15, 0.15, 0.15)
+"""Ambient light of which nothing is said, but of a preset of the environment."""
 PARALLEL = 1e-9
 """Sine of the angle between the line of sight and ``up``: below it float64's rounding decides where right is."""
 NARROWEST = 1e-6
@@ -87,29 +89,11 @@ class Camera:
 
 @refusing_in_one_line
 @dataclass(frozen=True, kw_only=True, config=CONFIG)
-class Environment:
-    """What a ray that hits nothing sees: a blend from ground to sky by its height, or an equirectangular image."""
-
-    sky: Color = (0.55, 0.70, 0.95)
-    """Radiance straight up."""
-    ground: Color = (0.30, 0.28, 0.25)
-    """Radiance straight down."""
-    image: Text | None = None
-    """A picture file, in place of sky and ground."""
-
-    @functools.cached_property
-    def picture(self) -> StoredPicture | None:
-        """The picture that ``image`` names, read when it is first asked for; None without one."""
-        return None if self.image is None else stored_picture(self.image)
-
-
-@refusing_in_one_line
-@dataclass(frozen=True, kw_only=True, config=CONFIG)
 class Lighting:
     """What all lights share."""
 
-    ambient: Color = (0.15, 0.15, 0.15)
-    """Added irradiance / pi."""
+    ambient: Color | None = None
+    """Added irradiance / pi. If not given, it is that of the environment's preset, or else ``AMBIENT``."""
     shadows: Flag = False
 
 
@@ -371,5 +355,16 @@ class Scene:
 
     @property
     def environment_image(self) -> StoredPicture | None:
-        """The picture that ``environment.image`` names; None without one."""
+        """The environment's picture; None without one."""
         return self.environment.picture
+
+    @property
+    def ambient(self) -> tuple[float, float, float]:
+        """Ambient light: what ``lighting`` says, or that of the environment's preset, or ``AMBIENT``."""
+        if self.lighting.ambient is not None:
+            return self.lighting.ambient
+        surroundings, strength = self.environment.surroundings, self.environment.strength
+        if surroundings is None:
+            return AMBIENT
+        red, green, blue = surroundings.ambient
+        return strength * red, strength * green, strength * blue

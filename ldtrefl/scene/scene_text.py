@@ -10,7 +10,7 @@ from typing import Any
 
 from ldtrefl.base.errors import InputError
 from ldtrefl.files.atomic_write import replaceable, written_whole
-from ldtrefl.scene.description import Material, Reflection, Scene
+from ldtrefl.scene.description import Environment, Material, Reflection, Scene
 from ldtrefl.scene.includes import Include
 from ldtrefl.scene.mesh import Mesh
 
@@ -20,7 +20,9 @@ FILES = ("mesh", "texture", "image", "file")
 COMMENTS = {
     "camera": "z is up",
     "camera.fov_y": "degrees from the lower to the upper edge",
-    "environment": "what a ray sees that hits nothing: a blend from ground to sky by its height",
+    "environment": "what a ray sees that hits nothing",
+    "environment.sky": "straight up, blended with the ground by height",
+    "environment.preset": "it brings light along",
     "lighting.ambient": "from all sides, as if it were the radiance of a white surface",
     "light.direction": "the way the light travels",
     "light.radiance": "leaving a white surface that faces it",
@@ -84,7 +86,7 @@ def scene_text(scene: Scene, path: Path, include: Include | None = None) -> str:
     """
     lines = _Lines(path)
     lines.table("camera", "[camera]", _written(scene.camera, always=True))
-    lines.table("environment", "[environment]", _written(scene.environment, always=scene.environment.image is None))
+    lines.table("environment", "[environment]", _environment(scene.environment))
     lines.table("lighting", "[lighting]", _written(scene.lighting, always=True))
     for light in scene.lights:
         lines.table("light", "[[light]]", _written(light))
@@ -110,6 +112,14 @@ def _written(entry: Any, *, always: bool = False) -> Iterator[tuple[str, Any]]:
         is_table = dataclasses.is_dataclass(value)
         if not is_table and value not in (None, {}) and (always or value != field.default):
             yield field.name, value
+
+
+def _environment(environment: Environment) -> Iterator[tuple[str, Any]]:
+    """(key, value) of what is not as by default, or of both colours where they are all that is seen."""
+    if environment.image is None and environment.preset is None:
+        yield from (("sky", environment.sky), ("ground", environment.ground))
+    else:
+        yield from _written(environment)
 
 
 def _material(material: Material) -> Iterator[tuple[str, Any]]:

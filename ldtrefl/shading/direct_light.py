@@ -75,7 +75,8 @@ def make_direct_radiance(share_lit: Callable[..., float], has_looks: bool) -> Ca
                 if share > 0.0:
                     if with_looks:
                         radiance = share * radiance
-                        shine += wp.cw_mul(highlights(finishes, towards), radiance)
+                        if lighting.lights[i].is_in_picture == 0:
+                            shine += wp.cw_mul(highlights(finishes, towards), radiance)
                     total += cosine * radiance
         light = surface.emission + wp.cw_mul(surface.albedo, total)
         if with_looks:

@@ -295,6 +295,7 @@ struct Finishes {
     struct Environment {
         Three up, sky, ground;
         Picture sharp;  // of no width without one
+        float turn, strength;  // of the picture, as LightingRecord has them
         const float* rough;
         int levels, rows, columns;
     };
@@ -304,7 +305,7 @@ struct Finishes {
         const float x_of_up = of.up.x < 0.0f ? -of.up.x : of.up.x;
         const Three reference = x_of_up > NEAR_X ? Three{0.0f, 1.0f, 0.0f} : Three{1.0f, 0.0f, 0.0f};
         const Three ahead = unit(minus(reference, scaled(dot(reference, of.up), of.up)));
-        u = 0.5f - atan2f(dot(direction, cross(of.up, ahead)), dot(direction, ahead)) * (0.5f / PI);
+        u = 0.5f - atan2f(dot(direction, cross(of.up, ahead)), dot(direction, ahead)) * (0.5f / PI) + of.turn;
         v = acosf(clamped(height, -1.0f, 1.0f)) * (1.0f / PI);
     }
 
@@ -329,7 +330,7 @@ struct Finishes {
             const Texel found = sample(one, u, v);
             total = sum(total, scaled(side ? at - (float)level : 1.0f - (at - (float)level), {found.x, found.y, found.z}));
         }
-        return total;
+        return scaled(of.strength, total);
     }
 
     // The direction in which a normal mirrors a ray along ``view``, not below the facet.

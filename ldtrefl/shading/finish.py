@@ -12,10 +12,10 @@ import math
 import warp as wp
 
 from ldtrefl.device.native_sources import native_body
-from ldtrefl.shading.environment import NEAR_X
 from ldtrefl.shading.surface import Surface, part_of
 from ldtrefl.shading.surfaces import Sighting
 from ldtrefl.world import look_records
+from ldtrefl.world.environment_frame import NEAR_X
 from ldtrefl.world.look_records import Looks
 from ldtrefl.world.records import LightingRecord, ObjectRecord
 from ldtrefl.world.reflectance_table import COLUMNS as TABLE_COLUMNS
@@ -229,6 +229,8 @@ around.sharp.floats = (const float*)lighting.image.data;
 around.sharp.bytes = (const unsigned char*)lighting.image_bytes.data;
 around.sharp.alpha = nullptr;
 around.sharp.decoded = looks.decoded.data;
+around.turn = lighting.turn;
+around.strength = lighting.strength;
 around.rough = (const float*)looks.environment.data;
 around.levels = looks.environment.shape[0];
 around.rows = looks.environment.shape[1];

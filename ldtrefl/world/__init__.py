@@ -7,8 +7,9 @@
     device_mesh.py      a mesh's arrays; outliers.py its triangles that are tested in float64; clusters.py for those who
                         draw it many times
     triangle_numbers.py numbers that lead back to a triangle of any object
-    appearance.py       colours and textures; lighting.py lights and environment
+    appearance.py       colours and textures
     looks.py            materials of files; hidden_backs.py the sides of them that are not there
+    lighting.py         lights and environment; environment_frame.py how that stands in the world
     camera.py           the camera as kernels see it
     unit_rays.py        rays in an object's own space
 

@@ -24,7 +24,7 @@ from ldtrefl.world.camera import unit_up
 from ldtrefl.world.device_mesh import DeviceMesh
 from ldtrefl.world.device_object import DeviceObject, DeviceObjects
 from ldtrefl.world.device_space import device_space
-from ldtrefl.world.lighting import lighting_of
+from ldtrefl.world.lighting import lighting_of, stand_up
 from ldtrefl.world.look_records import Looks
 from ldtrefl.world.object_records import fill_places, fill_records
 from ldtrefl.world.records import LightingRecord, ObjectRecord
@@ -67,9 +67,7 @@ class DeviceScene:
             self._place_all(before)
         same_picture = before is not None and before.scene.environment is scene.environment
         lighting_before: LightingRecord | None = before.lighting if before is not None and same_picture else None
-        self.lighting: LightingRecord = lighting_of(
-            scene, self.device_from_world, self._decoded, device, lighting_before
-        )
+        self.lighting: LightingRecord = lighting_of(scene, self._decoded, device, lighting_before)
         self.looks: Looks = self._looks.struct(scene.environment_image)
         self.look_from(scene.camera)
 
@@ -218,7 +216,7 @@ class DeviceScene:
     def look_from(self, camera: Camera) -> None:
         """Turn the environment to the camera's ``up``. The owner of the scene does so before every frame, and makes one
         frame at a time."""
-        self.lighting.up = wp.vec3(*unit_up(camera))
+        stand_up(self.lighting, self.scene, unit_up(camera), self.device_from_world, self.device)
 
 
 _STAMPS = itertools.count()

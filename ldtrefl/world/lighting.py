@@ -6,30 +6,26 @@ import numpy as np
 import warp as wp
 
 from ldtrefl.scene.description import Light, Scene
+from ldtrefl.scene.presets.base import DistantLight
+from ldtrefl.world.environment_frame import world_from_environment
 from ldtrefl.world.records import LightingRecord, LightRecord
 
 BRIGHTEST = 1e30
 """Intensity of a point light in device units: what is brighter is white all the same, and this is finite in float32."""
 
 
-def lighting_of(
-    scene: Scene, device_from_world: np.ndarray, decoded: wp.array, device: wp.Device, before: LightingRecord | None
-) -> LightingRecord:
-    """The lights and the environment of a scene. ``up`` is left at zero: it is the camera's and set before every frame.
+def lighting_of(scene: Scene, decoded: wp.array, device: wp.Device, before: LightingRecord | None) -> LightingRecord:
+    """The environment of a scene, and what its lights share. What depends on the camera's ``up``, the lights among it,
+    is left out: :func:`stand_up` sets it before every frame.
 
     Args:
         scene: what has them.
-        device_from_world: (4, 4) float64.
         decoded: (256,) float32, the linear value of every byte.
         device: where they are read.
         before: another record with the same environment picture, which is then used again; or None.
     """
     record = LightingRecord()
-    lights = [_light(light, device_from_world) for light in scene.lights]
-    record.lights = (
-        wp.array(lights, dtype=LightRecord, device=device) if lights else wp.empty(0, dtype=LightRecord, device=device)
-    )
-    record.ambient = wp.vec3(*scene.lighting.ambient)
+    record.ambient = wp.vec3(*scene.ambient)
     record.sky, record.ground = wp.vec3(*scene.environment.sky), wp.vec3(*scene.environment.ground)
     if before is not None:
         for name in ("image_size", "image", "image_bytes"):
@@ -42,6 +38,37 @@ def lighting_of(
             setattr(record, name, wp.array(own, dtype=dtype, device=device, copy=False))
     record.decoded = decoded
     record.shadows = int(scene.lighting.shadows)
+    record.turn, record.strength = scene.environment.rotation / 360.0 % 1.0, scene.environment.strength
+    return record
+
+
+def stand_up(
+    record: LightingRecord, scene: Scene, up: np.ndarray, device_from_world: np.ndarray, device: wp.Device
+) -> None:
+    """Turn the environment and the lights that it brings along to a camera's ``up``, a (3,) unit vector."""
+    if record.lights is not None and tuple(record.up) == tuple(wp.vec3(*up)):
+        return
+    record.up = wp.vec3(*up)
+    lights = [_light(light, device_from_world) for light in scene.lights]
+    surroundings, strength = scene.environment.surroundings, scene.environment.strength
+    if surroundings is not None:
+        to_world = world_from_environment(up, scene.environment.rotation)
+        lights += [_distant(light, to_world, strength) for light in surroundings.lights]
+        if surroundings.disc is not None:
+            record.sun = wp.vec3(*(to_world @ surroundings.disc.towards))
+            record.sun_size = (2.0 * np.sin(surroundings.disc.radius / 2.0)) ** 2
+            record.sun_radiance = strength * wp.vec3(*surroundings.disc.radiance)
+    record.lights = (
+        wp.array(lights, dtype=LightRecord, device=device) if lights else wp.empty(0, dtype=LightRecord, device=device)
+    )
+
+
+def _distant(light: DistantLight, world_from_own: np.ndarray, strength: float) -> LightRecord:
+    """A light of the environment."""
+    record = LightRecord()
+    record.towards = wp.vec3(*(world_from_own @ light.towards))
+    record.radiance = strength * wp.vec3(*light.radiance)
+    record.is_in_picture = int(light.is_in_picture)
     return record
 
 

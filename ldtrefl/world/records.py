@@ -51,6 +51,7 @@ class LightRecord:
     towards: wp.vec3  # directional: the way to the light, unit
     position: wp.vec3d  # point: where it is
     radiance: wp.vec3  # directional: as in the scene; point: intensity in device units
+    is_in_picture: int  # 1 if the environment's picture shows it: nothing mirrors it again
 
 
 @wp.struct
@@ -65,5 +66,10 @@ class LightingRecord:
     image_size: wp.vec2i  # rows and columns of the equirectangular picture; 0 without one
     image: wp.array2d(dtype=wp.vec3)  # its pixels if they are floats, linear; else empty
     image_bytes: wp.array2d(dtype=wp.vec3ub)  # its pixels if they have 8 bits, sRGB; else empty
+    turn: float  # of the picture about ``up``, counter-clockwise seen from above; from 0 to below 1, a whole turn
+    strength: float  # times the picture
+    sun: wp.vec3  # unit vector to the disc that stands before the picture
+    sun_size: float  # its radius on the unit sphere, squared; 0 without one
+    sun_radiance: wp.vec3
     decoded: wp.array(dtype=float)  # the linear value of every byte
     shadows: int  # 1 if lights cast shadows

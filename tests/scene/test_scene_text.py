@@ -62,6 +62,25 @@ def test_all_that_a_scene_may_hold_is_written(tmp_path: Path) -> None:
     assert again == scene
 
 
+@pytest.mark.parametrize(
+    "environment",
+    [
+        Environment(preset="sunset", sun_azimuth=15.0, ground_albedo=0.2, rotation=-30.0),
+        Environment(preset="studio", strength=0.7),
+        Environment(sky=0.5),
+    ],
+    ids=lambda environment: str(environment.preset),
+)
+def test_environments_are_written(tmp_path: Path, environment: Environment) -> None:
+    scene = dataclasses.replace(composed((Object(shape="sphere"),), None), environment=environment)
+    scene = dataclasses.replace(scene, lighting=ldtrefl.Lighting(shadows=True))
+    save_scene(tmp_path / "made.toml", scene)
+    assert ldtrefl.load_scene(tmp_path / "made.toml") == scene
+    written = tomllib.loads((tmp_path / "made.toml").read_text())
+    assert len(written["environment"]) == (4 if environment.preset == "sunset" else 2)
+    assert written["lighting"] == {"shadows": True}
+
+
 @pytest.mark.parametrize("name", ['quo"te.obj', "back\\slash.obj", "Straße 🙂.obj", "tab\there.obj", "bell\x7f.obj"])
 def test_names_of_any_kind_are_written(tmp_path: Path, name: str) -> None:
     scene = composed((Object(name=name, mesh=on_disk(tmp_path, name)),), None)

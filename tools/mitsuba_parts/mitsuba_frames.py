@@ -47,7 +47,7 @@ class MitsubaFrames:
 
     def __init__(self, scene: Scene, threads: int) -> None:
         materials = [entry.material for entry in scene.objects]
-        if scene.environment.image or any(any(m.emission) or m.fresnel for m in materials):
+        if scene.environment.image or scene.environment.preset or any(any(m.emission) or m.fresnel for m in materials):
             raise InputError("Mitsuba's frames have no emission, Fresnel's law or pictures of environments")
         self._threads, self._cameras = threads, moving(scene.camera)
         self._described = scene
@@ -145,7 +145,7 @@ class LitFrames(MitsubaFrames):
         mi, dr = self._mi, self._dr
         facet = dr.mulsign(met.n, -dr.dot(met.n, ray.d))
         normal = dr.mulsign(met.sh_frame.n, dr.dot(met.sh_frame.n, facet))
-        total = mi.Color3f(*self._described.lighting.ambient)
+        total = mi.Color3f(*self._described.ambient)
         for light in self._described.lights:
             towards, radiance, shadow_ray = self._arriving(light, met)
             cosine = dr.dot(normal, towards)

@@ -63,7 +63,8 @@ def _gltf_info(path: Path) -> None:
 def _scene_info(scene: Scene, memory: int) -> None:
     camera = scene.camera
     say(f"camera: {camera.width} x {camera.height}, eye {list(camera.eye)}, fov_y {camera.fov_y}")
-    kinds = [light.kind for light in scene.lights]
+    kinds: list[str] = [light.kind for light in scene.lights]
+    kinds += [] if scene.environment.preset is None else [f"those of the preset '{scene.environment.preset}'"]
     say(f"lights: {', '.join(kinds) or 'none'}; shadows: {scene.lighting.shadows}")
     say(f"method: {scene.reflection.method}, max_bounces: {scene.reflection.max_bounces}")
     table = Table("object", "geometry", "triangles", "mirrors", "size in the world")

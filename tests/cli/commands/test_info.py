@@ -40,3 +40,9 @@ def test_a_gltf_file_lists_its_nodes(run: Callable[..., Done], scene_folder: Pat
     (scene_folder / "b.glb").write_bytes(b"glTF")
     done = run("info", "b.glb")
     assert done.status == 2 and done.errors == ["ldtrefl: b.glb: it is cut off"]
+
+
+def test_a_preset_brings_its_lights(run: Callable[..., Done], scene_folder: Path) -> None:
+    text = (scene_folder / "scene.toml").read_text() + '\n[environment]\npreset = "sky"\n'
+    (scene_folder / "sky.toml").write_text(text)
+    assert "lights: those of the preset 'sky'" in run("info", "sky.toml").output

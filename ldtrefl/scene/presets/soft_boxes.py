@@ -1,0 +1,137 @@
+"""The preset "studio": a dim room with soft boxes, as for photographs of things that gleam.
+
+The camera is taken to stand at azimuth -90 degrees (-y), or up to a third of a right angle beside it. Each box is seen
+in mirrors as it is. What is matt gets the light of the key and of the overhead box from four directions about the
+middle of each, so that shadows are few and have a soft edge; that of the others, like that of the walls, is ambient
+light.
+"""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+
+import numpy as np
+
+from ldtrefl.files.stored_picture import StoredPicture
+from ldtrefl.scene.presets.base import (
+    DistantLight,
+    Surroundings,
+    direction,
+    mean_radiance,
+    picture_directions,
+    solid_angles,
+    three,
+)
+
+ROWS = 384
+"""Of the picture: half a degree each, a quarter of the edge of a box."""
+
+
+@dataclass(frozen=True)
+class Box:
+    """A rectangle that glows evenly but for its rim, and faces the middle of the room."""
+
+    azimuth: float
+    """Degrees, of its middle."""
+    elevation: float
+    width: float
+    """Half of it, as seen from the middle of the room: the tangent of an angle."""
+    height: float
+    radiance: tuple[float, float, float]
+    spread: float = 0.0
+    """Degrees from its middle to each of four lights that stand for it, up or down and right or left; if 0, its light
+    is part of the ambient light."""
+
+
+BOXES = (
+    Box(-50.0, 43.0, 0.46, 0.46, (2.7, 2.62, 2.5), spread=3.0),  # key
+    Box(-166.0, 27.0, 0.34, 0.58, (0.86, 0.9, 0.96)),  # fill
+    Box(36.0, 20.0, 0.11, 0.5, (2.6, 2.6, 2.66)),  # rims
+    Box(150.0, 22.0, 0.11, 0.5, (2.3, 2.3, 2.36)),
+    Box(90.0, 78.0, 0.72, 0.22, (2.5, 2.5, 2.5), spread=5.0),  # overhead
+)
+
+EDGE = 0.03
+"""How far a box's light falls off at its rim, as a tangent."""
+
+VIGNETTE = 0.35
+"""How much darker a box is in its corners than in its middle."""
+
+
+TINT = (1.0, 0.985, 0.96)
+"""Of the walls."""
+CEILING, HORIZON, FLOOR = 0.035, 0.26, 0.2
+"""Radiance of the walls straight up, at eye level and straight down."""
+FADES = 0.28
+"""Sine of the elevation over which the walls get darker."""
+POOL = 0.34
+"""Radiance of the light on the wall behind the subject, in its middle."""
+POOL_ELEVATION, POOL_RADIUS = 8.0, 30.0
+"""Degrees: where its middle is, and how far from it it is 1 / e as bright."""
+
+
+@functools.lru_cache(maxsize=1)
+def studio() -> Surroundings:
+    """The room with all its boxes."""
+    directions = picture_directions(ROWS)
+    pixels = _room(directions)
+    ambient = mean_radiance(pixels)
+    lights: list[DistantLight] = []
+    for box in BOXES:
+        rows, columns, glow = _glow(box, directions)
+        pixels[rows, columns] += glow
+        received = (glow * solid_angles(ROWS)[rows]).sum(axis=0, dtype=float) / np.pi
+        if box.spread > 0.0:
+            lights += _lights(box, received)
+        else:
+            ambient += 0.25 * received
+    return Surroundings(StoredPicture(pixels), three(ambient), tuple(lights))
+
+
+def _room(directions: np.ndarray) -> np.ndarray:
+    """(rows, columns, 3) float32 radiance of the walls: dim above, and behind the subject a pool of light."""
+    height = directions[:, :1, 2]
+    walls = CEILING + (HORIZON - CEILING) * np.exp(-np.maximum(height, 0.0) / FADES)
+    floor = HORIZON + (FLOOR - HORIZON) * np.minimum(-2.0 * np.minimum(height, 0.0), 1.0)
+    pool_middle, widens = direction(90.0, POOL_ELEVATION).astype(np.float32), 1.0 - np.cos(np.radians(POOL_RADIUS))
+    pool = POOL * np.exp((directions @ pool_middle - 1.0) / np.float32(widens))
+    return np.asarray((np.where(height < 0.0, floor, walls) + pool)[..., None] * np.array(TINT, np.float32))
+
+
+def _glow(box: Box, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Rows and columns of the pixels that a box is near, and (n, 3) float32 its radiance in each."""
+    ahead, right, up = (axis.astype(np.float32) for axis in _frame(box))
+    depth = directions @ ahead
+    rows, columns = np.nonzero(depth > 1.0 / np.sqrt(1.0 + box.width**2 + box.height**2))
+    near = directions[rows, columns]
+    x, y = (np.abs(near @ axis) / depth[rows, columns] for axis in (right, up))
+    falls = 1.0 - 0.5 * VIGNETTE * ((x / box.width) ** 2 + (y / box.height) ** 2)
+    glow = _smooth((box.width - x) / EDGE) * _smooth((box.height - y) / EDGE) * falls
+    return rows, columns, glow[:, None] * np.array(box.radiance, np.float32)
+
+
+def _smooth(at: np.ndarray) -> np.ndarray:
+    """From 0 to 1 without a kink, between 0 and 1."""
+    at = np.clip(at, 0.0, 1.0)
+    return at * at * (3.0 - 2.0 * at)
+
+
+def _frame(box: Box) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Unit vectors to a box's middle, along its width and along its height."""
+    ahead, right = direction(box.azimuth, box.elevation), direction(box.azimuth - 90.0, 0.0)
+    return ahead, right, np.cross(right, ahead)
+
+
+def _lights(box: Box, received: np.ndarray) -> list[DistantLight]:
+    """What stands for a box, of which a white surface that faces it scatters ``received``."""
+    ahead, right, up = _frame(box)
+    aside = np.tan(np.radians(box.spread))
+    corners = [(x, y) for x in (-aside, aside) for y in (-aside, aside)]
+    made = []
+    for x, y in corners:
+        towards = ahead + x * right + y * up
+        towards /= np.sqrt(np.vecdot(towards, towards))
+        radiance = received / len(corners)
+        made.append(DistantLight(three(towards), three(radiance), is_in_picture=True))
+    return made
