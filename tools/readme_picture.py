@@ -74,7 +74,7 @@ def picture_with_inset() -> np.ndarray:
 def picture_of_stages() -> np.ndarray:
     """(h, w, 3) float32: the teapot on all of ``STAGES``, at half their size."""
     teapot = ldtrefl.Object(name="teapot", shape="teapot", material=ldtrefl.Material(albedo=(0.6, 0.16, 0.1)))
-    pictures = [halved(ldtrefl.render(composed((teapot,), on, size=STAGE_SIZE)).image) for on in STAGES]
+    pictures = [halved(as_shown(composed((teapot,), on, size=STAGE_SIZE))) for on in STAGES]
     return _side_by_side(pictures, axis=1)
 
 
@@ -85,8 +85,13 @@ def picture_of_mirrors() -> np.ndarray:
 
 
 def rendered(name: str) -> np.ndarray:
-    """(h, w, 3) float32: a shipped scene, as the screen shows it: what is brighter than white is white."""
-    return ldtrefl.render(ldtrefl.load_scene(ROOT / "scenes" / f"{name}.toml"), "ldt").image.clip(0.0, 1.0)
+    """(h, w, 3) float32: a shipped scene."""
+    return as_shown(ldtrefl.load_scene(ROOT / "scenes" / f"{name}.toml"))
+
+
+def as_shown(scene: ldtrefl.Scene) -> np.ndarray:
+    """(h, w, 3) float32: a scene as the screen shows it: what is brighter than white is white."""
+    return ldtrefl.render(scene, "ldt").image.clip(0.0, 1.0)
 
 
 def halved(picture: np.ndarray) -> np.ndarray:

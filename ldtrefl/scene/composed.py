@@ -10,7 +10,6 @@ import numpy as np
 from ldtrefl.scene.description import Camera, Light, Lighting, Object, Scene
 from ldtrefl.scene.framing import three_quarter_camera
 from ldtrefl.scene.stages import CHROME, bare, find_stage, makes_a_mirror
-from ldtrefl.scene.studio import studio_lighting, studio_lights
 from ldtrefl.scene.subject import Subject
 
 BESIDE_OWN_LIGHTS = Lighting(ambient=(0.05, 0.05, 0.05), shadows=True)
@@ -58,7 +57,7 @@ def composed(
     return Scene(
         camera=camera,
         environment=stage.environment,
-        lighting=BESIDE_OWN_LIGHTS if has_own else studio_lighting(),
-        lights=tuple(lights) if has_own else studio_lights(),
+        lighting=BESIDE_OWN_LIGHTS if has_own else stage.lighting,
+        lights=tuple(lights) if has_own else stage.lights,
         objects=(*objects, *stage.objects),
     )

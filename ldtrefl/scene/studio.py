@@ -1,4 +1,5 @@
-"""Soft studio light: a key light from the right, a fill from the camera, a rim from behind, and ambient light.
+"""Soft light for what stands alone before a plain backdrop: a key light from the right, a fill from the camera, a rim
+from behind, and ambient light.
 
 The directions are those of three-quarter views (``framing.py``). Key light that falls from the right lights the side
 that a mirror on the right shows. The key is four lights close together, so that its shadow has a soft edge. White that
@@ -38,21 +39,6 @@ def studio_lights() -> tuple[Light, ...]:
         Light(kind="directional", direction=tidy_point(-towards(*place), DIRECTION_DIGITS), radiance=radiance)
         for place, radiance in placed
     )
-
-
-def floor_light() -> np.ndarray:
-    """(3,): radiance of a white floor that all lights reach."""
-    total = np.array(AMBIENT)
-    for light in studio_lights():
-        direction = np.array(light.direction)
-        total += -direction[2] / np.sqrt(np.vecdot(direction, direction)) * np.array(light.radiance)
-    return total
-
-
-def albedo_seen_as(color: np.ndarray) -> tuple[float, float, float]:
-    """The albedo of a floor that looks like this where all lights reach it."""
-    red, green, blue = (tidy(value, COLOR_DIGITS) for value in color / floor_light())
-    return red, green, blue
 
 
 def backdrop(horizon: np.ndarray, zenith: np.ndarray) -> Environment:

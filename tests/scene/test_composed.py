@@ -8,7 +8,7 @@ import pytest
 import ldtrefl
 from ldtrefl import Camera, Light, Material, Object
 from ldtrefl.scene.composed import BESIDE_OWN_LIGHTS, composed
-from ldtrefl.scene.stages import CHROME, STAGES
+from ldtrefl.scene.stages import CHROME, STAGES, STUDIO
 from ldtrefl.scene.studio import studio_lighting, studio_lights
 
 THING = Object(name="thing", shape="torus_knot", params={"segments": [96, 16]})
@@ -20,7 +20,10 @@ CAMERA = Camera(eye=(0.0, -9.0, 0.0), look_at=(0.0, 0.0, 0.0))
 def test_objects_stay_where_they_are_and_come_first(on: str | None) -> None:
     scene = composed((THING, dataclasses.replace(THING, translate=(3.0, 0.0, 0.0))), on)
     assert scene.objects[1].translate == (3.0, 0.0, 0.0) and scene.objects[0].name == "thing"
-    assert scene.lights == studio_lights() and scene.lighting == studio_lighting()
+    if on is None:
+        assert scene.lights == studio_lights() and scene.lighting == studio_lighting()
+    else:
+        assert scene.lights == () and scene.environment == STUDIO and scene.lighting.shadows
     assert (len(scene.objects) == 2) == (on is None)
 
 
@@ -49,7 +52,7 @@ def test_its_own_lights_and_camera_count_without_a_stage() -> None:
     own = composed((THING,), None, lights=(LIGHT,), camera=CAMERA)
     assert own.lights == (LIGHT,) and own.camera == CAMERA and own.lighting == BESIDE_OWN_LIGHTS
     staged = composed((THING,), "studio", lights=(LIGHT,), camera=CAMERA)
-    assert staged.lights == studio_lights() and staged.camera != CAMERA
+    assert staged.lights == () and staged.camera != CAMERA
     sized = composed((THING,), None, camera=CAMERA, size=(10, 20)).camera
     assert sized == dataclasses.replace(CAMERA, width=10, height=20)
     assert composed((THING,), None, lights=(LIGHT,)).camera == composed((THING,), None).camera

@@ -9,7 +9,6 @@ import ldtrefl
 from ldtrefl.scene.layout import Layout
 from ldtrefl.scene.mesh_scene import FROM_Y_UP, mesh_scene, parts_of_file, up_axis_of
 from ldtrefl.scene.placement import UpAxis
-from ldtrefl.scene.studio import studio_lights
 from tests.scene.gltf.writer import Written
 
 OBJ = "v 0 0 0\nv 1 0 0\nv 0 2 0\nv 0 0 3\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
@@ -116,7 +115,7 @@ def test_its_own_camera_and_lights_count_without_a_stage(tmp_path: Path) -> None
     middle = ldtrefl.render(alone).image[10, 15]
     np.testing.assert_allclose(middle / middle[0], np.array([1.05, 0.55, 0.05]) / 1.05, rtol=1e-3)
     staged = ldtrefl.load_scene(path, on="studio", size=(30, 20))
-    assert staged.lights == studio_lights() and staged.camera.eye != alone.camera.eye
+    assert staged.lights == () and staged.camera.eye != alone.camera.eye
 
 
 def test_what_a_file_requires_and_is_not_read_is_refused_or_left_out(tmp_path: Path) -> None:

@@ -91,8 +91,11 @@ def test_names_of_any_kind_are_written(tmp_path: Path, name: str) -> None:
 def test_a_key_is_explained_where_it_comes_first() -> None:
     scene = composed((Object(shape="sphere"),), "mirror-ball")
     text = scene_text(scene, Path("made.toml"))
-    for comment in ("what a ray sees that hits nothing", "the way the light travels", "specular reflectance"):
+    for comment in ("what a ray sees that hits nothing", "it brings light along", "specular reflectance"):
         assert text.count(comment) == 1
+    alone = scene_text(composed((Object(shape="sphere"),), None), Path("made.toml"))
+    for comment in ("straight up, blended with the ground", "the way the light travels"):
+        assert alone.count(comment) == 1
     written = tomllib.loads(text)
     assert [entry.get("name") for entry in written["object"]][1:3] == ["floor", "mirror ball"]
 
@@ -129,7 +132,7 @@ def test_what_a_gltf_file_holds_is_included(tmp_path: Path) -> None:
         scene = mesh_scene(path, "mirror-ball", up, size=(36, 24))
         save_scene(tmp_path / "made.toml", scene, include_of(path, up))
         again = ldtrefl.load_scene(tmp_path / "made.toml")
-        assert len(again.objects) == len(scene.objects) == 3 + 4
+        assert len(again.objects) == len(scene.objects) == 3 + 2
         np.testing.assert_array_equal(ldtrefl.render(again).image, ldtrefl.render(scene).image)
     mirrors = composed(scene.objects[:3], None, mirror_self=True)
     with pytest.raises(ldtrefl.InputError, match="is in no file that a scene could name"):

@@ -42,5 +42,5 @@ def test_pictures_of_stages_stand_in_a_row(monkeypatch: pytest.MonkeyPatch) -> N
     assert picture.shape == (8, 3 * 12 + 2 * gap, 3)
     assert set(readme_picture.STAGES) < set(STAGES)
     pictures = [picture[:, left : left + 12] for left in (0, 12 + gap, 24 + 2 * gap)]
-    assert (picture[:, 12 : 12 + gap] == 1.0).all() and all((one < 1.0).all() for one in pictures)
+    assert (picture[:, 12 : 12 + gap] == 1.0).all() and all((one <= 1.0).all() and one.mean() < 0.6 for one in pictures)
     assert len({one.tobytes() for one in pictures}) == 3

@@ -45,11 +45,11 @@ class Box:
 
 
 BOXES = (
-    Box(-50.0, 43.0, 0.46, 0.46, (2.7, 2.62, 2.5), spread=3.0),  # key
-    Box(-166.0, 27.0, 0.34, 0.58, (0.86, 0.9, 0.96)),  # fill
-    Box(36.0, 20.0, 0.11, 0.5, (2.6, 2.6, 2.66)),  # rims
-    Box(150.0, 22.0, 0.11, 0.5, (2.3, 2.3, 2.36)),
-    Box(90.0, 78.0, 0.72, 0.22, (2.5, 2.5, 2.5), spread=5.0),  # overhead
+    Box(-36.0, 38.0, 0.44, 0.44, (2.95, 2.88, 2.76), spread=3.0),  # key
+    Box(-162.0, 27.0, 0.34, 0.58, (0.66, 0.69, 0.74)),  # fill
+    Box(40.0, 18.0, 0.1, 0.5, (2.0, 2.0, 2.05)),  # rims
+    Box(150.0, 20.0, 0.1, 0.5, (1.9, 1.9, 1.95)),
+    Box(90.0, 80.0, 0.6, 0.22, (2.7, 2.7, 2.7), spread=5.0),  # overhead
 )
 
 EDGE = 0.03
@@ -61,14 +61,17 @@ VIGNETTE = 0.35
 
 TINT = (1.0, 0.985, 0.96)
 """Of the walls."""
-CEILING, HORIZON, FLOOR = 0.035, 0.26, 0.2
+CEILING, HORIZON, FLOOR = 0.035, 0.3, 0.22
 """Radiance of the walls straight up, at eye level and straight down."""
-FADES = 0.28
-"""Sine of the elevation over which the walls get darker."""
+FADES = 0.4
+"""Sine of the elevation at which the walls are 1 / e as bright as at eye level, above the ceiling."""
 POOL = 0.34
 """Radiance of the light on the wall behind the subject, in its middle."""
-POOL_ELEVATION, POOL_RADIUS = 8.0, 30.0
+POOL_ELEVATION, POOL_RADIUS = 18.0, 28.0
 """Degrees: where its middle is, and how far from it it is 1 / e as bright."""
+POOL_RISES = 0.25
+"""Sine of the elevation from which on it is whole. It begins at the horizon, which is everywhere alike: a floor can
+meet it without a line."""
 
 
 @functools.lru_cache(maxsize=1)
@@ -92,10 +95,10 @@ def studio() -> Surroundings:
 def _room(directions: np.ndarray) -> np.ndarray:
     """(rows, columns, 3) float32 radiance of the walls: dim above, and behind the subject a pool of light."""
     height = directions[:, :1, 2]
-    walls = CEILING + (HORIZON - CEILING) * np.exp(-np.maximum(height, 0.0) / FADES)
+    walls = CEILING + (HORIZON - CEILING) * np.exp(-((np.maximum(height, 0.0) / FADES) ** 2))
     floor = HORIZON + (FLOOR - HORIZON) * np.minimum(-2.0 * np.minimum(height, 0.0), 1.0)
     pool_middle, widens = direction(90.0, POOL_ELEVATION).astype(np.float32), 1.0 - np.cos(np.radians(POOL_RADIUS))
-    pool = POOL * np.exp((directions @ pool_middle - 1.0) / np.float32(widens))
+    pool = POOL * _smooth(height / POOL_RISES) * np.exp((directions @ pool_middle - 1.0) / np.float32(widens))
     return np.asarray((np.where(height < 0.0, floor, walls) + pool)[..., None] * np.array(TINT, np.float32))
 
 
