@@ -70,6 +70,6 @@ class LightingRecord:
     strength: float  # times the picture
     sun: wp.vec3  # unit vector to the disc that stands before the picture
     sun_size: float  # its radius on the unit sphere, squared; 0 without one
-    sun_radiance: wp.vec3
+    sun_radiance: wp.vec3  # of the disc
     decoded: wp.array(dtype=float)  # the linear value of every byte
     shadows: int  # 1 if lights cast shadows
