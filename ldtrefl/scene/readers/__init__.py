@@ -4,9 +4,9 @@
     archives.py         the mesh files in a file
     memory.py           how much memory reading one takes
     obj.py, mtl.py      OBJ files, whose text obj_text.py reads, and their materials
-    ply.py, off.py, threemf.py
-                        PLY (its tables: ply_tables.py), OFF and 3MF files
-    trimesh_pieces.py   the kinds that trimesh reads
+    ply.py, off.py, stl.py, threemf.py
+                        PLY (its tables: ply_tables.py), OFF, STL and 3MF files
+    trimesh_pieces.py   all other kinds, by trimesh
     pictures.py         the pictures that files name
     polygons.py         polygons -> triangles
 

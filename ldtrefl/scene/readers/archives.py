@@ -23,7 +23,7 @@ ARCHIVES = (".zip", ".tar.gz", ".tgz", ".tar.bz2", ".bz2", ".gz")
 PACKED_ALONE: dict[str, Callable] = {".gz": gzip.open, ".bz2": bz2.open}
 """Of a single file; what that names stands beside the archive."""
 
-OWN_KINDS = ("3mf", "obj", "off", "ply")
+OWN_KINDS = ("3mf", "obj", "off", "ply", "stl", "stl_ascii")
 """What our own readers read, besides glTF."""
 
 MOST_MEMBERS = 10_000

@@ -1,6 +1,6 @@
 """How much memory trimesh takes to read a mesh file: estimated from its size and its kind.
 
-The figures are the highest of what was measured, with trimesh 5.2, for files of one million triangles and for the
+The figure is the highest of what was measured, with trimesh 5.2, for files of one million triangles and for the
 shortest rows that a kind allows. Our own readers ask for what they take as they go.
 """
 
@@ -9,11 +9,8 @@ from __future__ import annotations
 import zipfile
 from io import BytesIO
 
-STL = 5.0
-"""Bytes per byte of a binary STL file; one of text takes twice as many."""
-
-OTHER = 40.0
-"""Bytes per byte of files of other kinds, most of which are XML."""
+BYTES_PER_BYTE = 40.0
+"""Bytes per byte of a file, most of which are XML."""
 
 
 def reading_bytes(data: bytes, kind: str) -> float:
@@ -21,11 +18,9 @@ def reading_bytes(data: bytes, kind: str) -> float:
 
     Args:
         data: the file.
-        kind: how its name ends, such as 'stl'.
+        kind: how its name ends, such as 'dae'.
     """
     if kind in ("3dxml", "zae"):
         with zipfile.ZipFile(BytesIO(data)) as archive:
-            return OTHER * sum(entry.file_size for entry in archive.infolist())
-    if kind in ("stl", "stl_ascii"):
-        return (2.0 if data[:5].lower() == b"solid" else 1.0) * STL * len(data)
-    return OTHER * len(data)
+            return BYTES_PER_BYTE * sum(entry.file_size for entry in archive.infolist())
+    return BYTES_PER_BYTE * len(data)

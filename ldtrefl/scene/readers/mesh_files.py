@@ -31,6 +31,7 @@ from ldtrefl.scene.readers.memory import reading_bytes
 from ldtrefl.scene.readers.obj import pieces_of_obj
 from ldtrefl.scene.readers.off import pieces_of_off
 from ldtrefl.scene.readers.ply import pieces_of_ply
+from ldtrefl.scene.readers.stl import pieces_of_stl
 from ldtrefl.scene.readers.threemf import pieces_of_3mf
 from ldtrefl.scene.readers.trimesh_pieces import pieces_by_trimesh
 from ldtrefl.scene.readers.trimesh_warnings import trimesh_warnings
@@ -39,6 +40,9 @@ _log = logging.getLogger("ldtrefl")
 
 GLTF = ("glb", "gltf")
 """Kinds that our own reader reads."""
+
+ALONE = {"off": pieces_of_off, "3mf": pieces_of_3mf, "stl": pieces_of_stl, "stl_ascii": pieces_of_stl}
+"""Readers of kinds that name no other files."""
 
 
 def load_mesh(path: str | Path) -> Mesh:
@@ -108,10 +112,8 @@ def _read(data: bytes, kind: str, beside: Resolver) -> tuple[list[Piece], list[s
     if kind in GLTF:
         asset = Asset.read(data, beside.get)
         return placed_pieces(asset), asset.not_shown()
-    if kind == "off":
-        return pieces_of_off(data)
-    if kind == "3mf":
-        return pieces_of_3mf(data)
+    if kind in ALONE:
+        return ALONE[kind](data)
     reader = {"obj": pieces_of_obj, "ply": pieces_of_ply}.get(kind)
     return reader(data, beside.get) if reader else _read_by_trimesh(data, kind, beside)
 
@@ -121,7 +123,5 @@ def _read_by_trimesh(data: bytes, kind: str, beside: Resolver) -> tuple[list[Pie
     with budget.given_back():
         budget.take(reading_bytes(data, kind), f"reading it as {kind}")
     with trimesh_warnings() as warnings:
-        pieces, not_shown = pieces_by_trimesh(data, kind, beside)
-    if warnings and kind.startswith("stl"):
-        raise InputError(f"not a mesh that can be read ({warnings[0]})")
-    return pieces, not_shown + [" ".join(line.split()) for line in warnings]
+        pieces = pieces_by_trimesh(data, kind, beside)
+    return pieces, [" ".join(line.split()) for line in warnings]

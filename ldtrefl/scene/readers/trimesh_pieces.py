@@ -1,13 +1,12 @@
-"""Mesh files of the kinds that trimesh reads here (STL, and those of its other readers that are installed) -> pieces.
+"""Mesh files of kinds without a reader of our own, as trimesh reads them with what is installed -> pieces.
 
-What they return is walked here: each piece is placed by the nodes of the file's
-scene, its normals by the inverse transpose, and a mirrored piece is wound the other way, so that it keeps its outside.
+What it returns is walked here: each piece is placed by the nodes of the file's scene, its normals by the inverse
+transpose, and a mirrored piece is wound the other way, so that it keeps its outside.
 """
 
 from __future__ import annotations
 
 import io
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,19 +19,13 @@ from ldtrefl.scene.piece import Piece, moved, unit_vectors
 from ldtrefl.scene.readers.polygons import triangles_of
 from ldtrefl.scene.readers.trimesh_materials import with_materials
 
-STL_HEADER, STL_ROW = 84, 50
-"""Bytes of a binary STL file before its triangles, and of each of them: its last two are a colour, if any program says
-so."""
 
-STL = ("stl", "stl_ascii")
-
-
-def pieces_by_trimesh(data: bytes, kind: str, beside: Resolver) -> tuple[list[Piece], list[str]]:
-    """The pieces of a mesh file in the order of its nodes, where these place them; what they do not show, a line each.
+def pieces_by_trimesh(data: bytes, kind: str, beside: Resolver) -> list[Piece]:
+    """The pieces of a mesh file in the order of its nodes, where these place them.
 
     Args:
         data: the file.
-        kind: how its name ends, such as 'stl'.
+        kind: how its name ends, such as 'dae'.
         beside: reads the files that it names.
 
     Raises:
@@ -46,22 +39,8 @@ def pieces_by_trimesh(data: bytes, kind: str, beside: Resolver) -> tuple[list[Pi
         nodes = read.get("graph") or [{"geometry": name, "frame_to": name} for name in geometry]
     found = {name: piece for name, entry in geometry.items() if (piece := _piece(entry)) is not None}
     own = dict(zip(found, with_materials(list(found.values())), strict=True))
-    if kind in STL:
-        # A facet is all that such a file knows: its normal counts.
-        own = {name: replace(piece, normals=np.zeros(piece.vertices.shape)) for name, piece in own.items()}
     placed = _placed([_node(node) for node in nodes], read.get("base_frame", "world"))
-    notes = ["colours of facets"] if kind in STL and _has_stl_colors(data) else []
-    return [moved(own[name], matrix) for name, matrix in placed if name in own], notes
-
-
-def _has_stl_colors(data: bytes) -> bool:
-    """Whether a binary STL file says that its facets have colours: in its header as Magics does, or by the highest bit
-    of each as VisCAM does."""
-    count = int.from_bytes(data[80:84], "little")
-    if len(data) != STL_HEADER + STL_ROW * count or not count:
-        return False
-    rows = np.frombuffer(data, np.uint8, STL_ROW * count, STL_HEADER).reshape(count, STL_ROW)
-    return b"COLOR=" in data[:80] or bool((rows[:, -1] & 0x80).all())
+    return [moved(own[name], matrix) for name, matrix in placed if name in own]
 
 
 def _piece(entry: dict[str, Any]) -> tuple[Piece, object | None] | None:

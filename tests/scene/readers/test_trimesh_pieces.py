@@ -3,7 +3,6 @@
 from pathlib import Path
 
 import numpy as np
-import pytest
 import trimesh
 
 import ldtrefl
@@ -49,27 +48,3 @@ def test_normals_that_are_none_are_undefined(tmp_path: Path) -> None:
     np.testing.assert_allclose(
         mesh.normals[mesh.faces].reshape(-1, 3)[:4], [[0] * 3, [0] * 3, *normals[2:4]], atol=1e-6
     )
-
-
-@pytest.mark.parametrize("kind", ["stl", "stl_ascii"])
-def test_facets_of_stl_files_are_flat(tmp_path: Path, kind: str) -> None:
-    """A box stays a box: normals of 0 stand for the facet's."""
-    (tmp_path / "a.stl").write_bytes(np.bytes_(trimesh.creation.box().export(file_type=kind)))
-    mesh = ldtrefl.load_mesh(tmp_path / "a.stl")
-    assert len(mesh.faces) == 12 and not mesh.normals.any()
-    np.testing.assert_array_equal(np.sort(mesh.bounds, axis=0), [[-0.5] * 3, [0.5] * 3])
-
-
-def test_colors_of_stl_facets_are_named(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    """In the two bytes of a facet that are left: as Magics and as VisCAM say that they are colours."""
-    plain = trimesh.creation.box().export(file_type="stl")
-    (tmp_path / "plain.stl").write_bytes(plain)
-    (tmp_path / "magics.stl").write_bytes(b"COLOR=\1\2\3\4".ljust(80) + plain[80:])
-    rows = np.frombuffer(plain[84:], np.uint8).reshape(12, 50).copy()
-    rows[:, 48:] = [31, 128]
-    (tmp_path / "viscam.stl").write_bytes(plain[:84] + rows.tobytes())
-    for name in ("plain", "magics", "viscam"):
-        ldtrefl.load_mesh(tmp_path / f"{name}.stl")
-    assert [record.getMessage().rpartition("/")[2] for record in caplog.records] == [
-        f"{name}.stl: not shown: colours of facets" for name in ("magics", "viscam")
-    ]
