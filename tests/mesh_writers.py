@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import bz2
+import gzip
+import io
 import json
 import struct
+import tarfile
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -76,3 +81,19 @@ def _ply_row(kind: str, properties: list[str], row: list[Any]) -> bytes:
         words += map(str, values)
         packed += struct.pack(f"{order}{len(values)}{PLY_LETTERS[types[-1]]}", *values)
     return (" ".join(words) + "\n").encode() if kind == "ascii" else packed
+
+
+def packed(path: Path, name: str, data: bytes) -> Path:
+    """Write an archive with a file, of the kind that its name says."""
+    if path.suffix == ".zip":
+        with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+            archive.writestr("readme.txt", "no mesh")
+            archive.writestr(name, data)
+    elif ".tar" in path.name:
+        with tarfile.open(path, "w:gz" if path.suffix == ".gz" else "w:bz2") as archive:
+            entry = tarfile.TarInfo(name)
+            entry.size = len(data)
+            archive.addfile(entry, io.BytesIO(data))
+    else:
+        path.write_bytes(gzip.compress(data) if path.suffix == ".gz" else bz2.compress(data))
+    return path

@@ -19,11 +19,14 @@ from ldtrefl.scene.placement import UpAxis
 from ldtrefl.scene.scene_parts import SceneParts
 from ldtrefl.scene.stages import makes_a_mirror
 
-GLTF = (".glb", ".gltf")
+GLTF = ("glb", "gltf")
 
-Y_UP = (*GLTF, ".obj")
+Y_UP = (*GLTF, "obj")
 """Files with y up: glTF by its specification, OBJ as most programs write it and as Blender reads it. Of the others
 Blender takes z for up, as 3MF and what is printed from STL do."""
+
+PACKED = (".zip", ".gz", ".tgz", ".bz2")
+"""How the names of archives end, whose mesh files say what they are (``readers/archives.py``)."""
 
 FROM_Y_UP: dict[UpAxis, tuple[float, float, float, float]] = {
     "x": (0.0, 1.0, 0.0, -90.0),
@@ -59,13 +62,15 @@ def mesh_scene(
 
 
 def up_axis_of(path: Path, up: str | None) -> UpAxis:
-    """The axis of a file that points up: ``up``, or else that of most files of its kind, by the ending of its name.
+    """The axis of a file that points up: ``up``, or else that of most files of its kind, by the ending of its name. In
+    an archive the endings of the mesh files count.
 
     Raises:
         InputError: ``up`` is no axis.
     """
     if up is None:
-        return "y" if path.suffix.lower() in Y_UP else "z"
+        kinds = _kinds(path)
+        return "y" if kinds and all(kind in Y_UP for kind in kinds) else "z"
     if up not in typing.get_args(UpAxis):
         raise unknown_name("axis", up, typing.get_args(UpAxis))
     return typing.cast(UpAxis, up)
@@ -96,8 +101,23 @@ def parts_of_file(path: Path, up: UpAxis, *, as_one: bool = False, lenient: bool
     return SceneParts((whole,), parts.lights, parts.cameras, parts.names) if as_one else parts
 
 
+def is_gltf(path: Path) -> bool:
+    """Whether a file, or the only mesh file in an archive, is a glTF file, by the ending of its name."""
+    kinds = _kinds(path)
+    return len(kinds) == 1 and kinds[0] in GLTF
+
+
+def _kinds(path: Path) -> list[str]:
+    """The kinds of mesh files that a file has."""
+    if path.suffix.lower() not in PACKED:
+        return [path.suffix.lower().lstrip(".")]
+    from ldtrefl.scene.readers.archives import kinds_inside  # noqa: PLC0415  trimesh takes a quarter of a second
+
+    return kinds_inside(str(path))
+
+
 def include_of(path: Path, up: UpAxis) -> Include | None:
     """What a scene file says to have the objects of a file; None if it is no glTF file, and one object."""
-    if path.suffix.lower() not in GLTF:
+    if not is_gltf(path):
         return None
     return Include(file=str(path), rotate=FROM_Y_UP[up], lights=False)

@@ -1,5 +1,6 @@
 """A mesh file as a scene."""
 
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -7,8 +8,9 @@ import pytest
 
 import ldtrefl
 from ldtrefl.scene.layout import Layout
-from ldtrefl.scene.mesh_scene import FROM_Y_UP, mesh_scene, parts_of_file, up_axis_of
+from ldtrefl.scene.mesh_scene import FROM_Y_UP, is_gltf, mesh_scene, parts_of_file, up_axis_of
 from ldtrefl.scene.placement import UpAxis
+from tests.mesh_writers import packed
 from tests.scene.gltf.writer import Written
 
 OBJ = "v 0 0 0\nv 1 0 0\nv 0 2 0\nv 0 0 3\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
@@ -28,6 +30,27 @@ def file(tmp_path: Path) -> Path:
 )
 def test_what_points_up_depends_on_the_kind_of_file(name: str, axis: str) -> None:
     assert up_axis_of(Path(name), None) == axis and up_axis_of(Path(name), "-x") == "-x"
+
+
+@pytest.mark.parametrize("ending", ["gz", "bz2", "zip", "tar.gz"])
+def test_what_is_packed_is_what_it_is_unpacked(tmp_path: Path, file: Path, ending: str) -> None:
+    """An OBJ file has y up, a GLB file its nodes, in an archive, too."""
+    for source, name in ((file, "corner.obj"), (gltf(tmp_path, name="sign.glb"), "sign.glb")):
+        path = packed(tmp_path / f"{name}.{ending}", name, source.read_bytes())
+        plain, scene = ldtrefl.load_scene(source), ldtrefl.load_scene(path)
+        np.testing.assert_array_equal(scene.layout.box, plain.layout.box)
+        assert is_gltf(path) == name.endswith("glb") and up_axis_of(path, None) == "y"
+        if is_gltf(path):
+            assert [entry.name for entry in scene.objects] == ["sign"]
+
+
+def test_kinds_that_differ_in_an_archive_have_z_up(tmp_path: Path) -> None:
+    with zipfile.ZipFile(tmp_path / "a.zip", "w") as archive:
+        for name in ("a.obj", "a.ply"):
+            archive.writestr(name, "")
+    (tmp_path / "b.zip").write_bytes(b"no archive")
+    for name in ("a.zip", "b.zip"):
+        assert up_axis_of(tmp_path / name, None) == "z" and not is_gltf(tmp_path / name)
 
 
 @pytest.mark.parametrize(("up", "height"), [(None, 2.0), ("x", 1.0), ("-y", 2.0), ("z", 3.0)])
@@ -66,11 +89,11 @@ def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
         ldtrefl.load_scene(tmp_path / "none.ply")
 
 
-def gltf(folder: Path, **more: object) -> Path:
+def gltf(folder: Path, name: str = "sign.gltf", **more: object) -> Path:
     """A file with a rectangle, from (0, 0, 0) to (2, 1, 0), in a node with a name; y is up and its front +z."""
     file = Written(**more)
     file.add("nodes", {"mesh": file.quad(place=False), "name": "sign"})
-    return file.save(folder, "sign.gltf")
+    return file.save(folder, name)
 
 
 def test_nodes_of_a_gltf_file_are_objects(tmp_path: Path) -> None:

@@ -18,15 +18,13 @@ from ldtrefl.ldt.peel import peel_mesh
 from ldtrefl.scene.description import Scene
 from ldtrefl.scene.load import load_scene
 from ldtrefl.scene.mesh import Mesh
+from ldtrefl.scene.mesh_scene import is_gltf
 from ldtrefl.world.device_mesh import DeviceMesh
 
 PLACE_IN_HELP = 40
 
 MESH_RESOLUTION = 128
 """Texels along the longest side of the maps that tell whether a mesh is closed."""
-
-GLTF = (".glb", ".gltf")
-"""Files that hold scenes, with nodes and materials."""
 
 app = typer.Typer()
 
@@ -42,7 +40,7 @@ def info(
         with budget.account() as account:
             loaded = load_scene(file)
         _scene_info(loaded, account.taken)
-    elif Path(file).suffix.lower() in GLTF:
+    elif is_gltf(Path(file)):
         _gltf_info(Path(file))
     else:
         _mesh_info(mesh_or_shape(file))

@@ -85,6 +85,20 @@ def mesh_files(path: str) -> Iterator[tuple[bytes, str, resolvers.Resolver]]:
         yield members[name], _kind(name), beside
 
 
+def kinds_inside(path: str) -> list[str]:
+    """The kinds of the mesh files in a file, such as ['obj']; none where it cannot be read, which its reader says."""
+    kind = archive_kind(path)
+    if kind is None:
+        return [_kind(path)]
+    if kind in PACKED_ALONE:
+        return [_kind(path[: -len(kind)])]
+    try:
+        with budget.account():
+            return [_kind(name) for name in _check_kinds(_member_names(path) if kind == ".zip" else _tar_members(path))]
+    except Exception:
+        return []
+
+
 def mesh_kinds() -> list[str]:
     """How the names of mesh files may end."""
     return sorted({*mesh_formats(), *OWN_KINDS})
@@ -106,6 +120,11 @@ def _kind(name: str) -> str:
 def _is_hidden(name: str) -> bool:
     """Whether a file of an archive is one of those that macOS adds."""
     return any(part == "__MACOSX" or part.startswith("._") for part in PurePosixPath(name).parts)
+
+
+def _member_names(path: str) -> list[str]:
+    with zipfile.ZipFile(path) as archive:
+        return [entry.filename for entry in archive.infolist()[: MOST_MEMBERS + 1]]
 
 
 def _zip_members(path: str) -> dict[str, bytes]:

@@ -1,6 +1,5 @@
 """The files in archives and beside a mesh: found, and none larger than is allowed."""
 
-import bz2
 import gzip
 import io
 import os
@@ -14,22 +13,7 @@ import trimesh
 import ldtrefl
 from ldtrefl import InputError
 from ldtrefl.base import budget
-
-
-def packed(path: Path, name: str, data: bytes) -> Path:
-    if path.suffix == ".zip":
-        with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
-            archive.writestr("readme.txt", "no mesh")
-            archive.writestr(name, data)
-    elif ".tar" in path.name:
-        with tarfile.open(path, "w:gz" if path.suffix == ".gz" else "w:bz2") as archive:
-            entry = tarfile.TarInfo(name)
-            entry.size = len(data)
-            archive.addfile(entry, io.BytesIO(data))
-    else:
-        path.write_bytes(gzip.compress(data) if path.suffix == ".gz" else bz2.compress(data))
-    return path
-
+from tests.mesh_writers import packed
 
 ARCHIVES = ("a.zip", "a.tar.gz", "a.tar.bz2", "a.stl.bz2", "a.stl.gz")
 
