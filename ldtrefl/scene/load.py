@@ -134,7 +134,7 @@ def _included(tables: dict[str, Any], includes: list[Include], path: Path) -> li
     if not includes:
         return []
     camera = _camera_of(tables)
-    parts = read_includes(includes, functools.partial(_beside, path), up_axis(camera))
+    parts = read_includes(includes, functools.partial(_file_near, path), up_axis(camera))
     found = [camera for part in parts for camera in part.cameras]
     if "camera" not in tables and found:
         tables["camera"] = found[0]
@@ -242,6 +242,14 @@ def _found_environment(environment: Environment, path: Path) -> Environment:
 
 
 def _beside(scene_path: Path, name: str, key: str) -> str:
+    """The file called ``name`` near the scene; a fault names the scene file."""
+    try:
+        return _file_near(scene_path, name, key)
+    except InputError as error:
+        raise error.within(str(scene_path)) from None
+
+
+def _file_near(scene_path: Path, name: str, key: str) -> str:
     """The file called ``name`` beside the scene, or else in the folders of LDTREFL_MESH_PATH."""
     listed = os.environ.get(MESH_PATH_VARIABLE, "").split(os.pathsep)
     folders = [scene_path.parent, *(Path(folder) for folder in listed if folder)]
@@ -251,9 +259,9 @@ def _beside(scene_path: Path, name: str, key: str) -> str:
             if candidate.is_file():
                 return str(candidate)
         except (OSError, ValueError) as error:
-            raise InputError(f"{scene_path}: {key}: '{name}' is no file name ({error})") from error
+            raise InputError(f"{key}: '{name}' is no file name ({error})") from error
     places = "beside the scene and in LDTREFL_MESH_PATH" + ("" if len(folders) > 1 else " (which is not set)")
-    raise InputError(f"{scene_path}: {key}: no file '{name}' (looked {places})")
+    raise InputError(f"{key}: no file '{name}' (looked {places})")
 
 
 def _at(path: Path, key: str, read: Callable[[], Result]) -> Result:
