@@ -153,3 +153,8 @@ def in_words(count: float) -> str:
         if count >= size:
             return f"{count / size:.1f} {unit}"
     return f"{int(count)} bytes"
+
+
+def is_refusal(error: InputError) -> bool:
+    """Whether an error says that something takes more memory than is allowed."""
+    return "--memory" in str(error)

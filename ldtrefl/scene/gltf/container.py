@@ -70,9 +70,13 @@ class Document:
         self._beside = beside
         self._buffers: dict[int, bytes] = {}
         self._unpacked: dict[int, memoryview] = {}
-        version = self.table(self.root.get("asset"), "asset").get("version")
+        asset = self.table(self.root.get("asset"), "asset")
+        version = asset.get("version")
         if not isinstance(version, str) or version.split(".")[0] != "2":
             raise InputError(f"asset.version: glTF 2.0 is read, got {_short(version)}")
+        # Who cannot read that version must not read the asset (3.2).
+        if asset.get("minVersion", "2.0") not in ("2", "2.0"):
+            raise InputError(f"asset.minVersion: glTF 2.0 is read, got {_short(asset['minVersion'])}")
 
     def entry(self, kind: str, number: object, place: str) -> Table:
         """Entry ``number`` of the array called ``kind``, which ``place`` refers to.
@@ -228,7 +232,8 @@ def _chunks(data: bytes) -> tuple[bytes, bytes | None]:
         at += CHUNK_HEADER + size + -size % 4
     if JSON_CHUNK not in found:
         raise InputError("it has no JSON")
-    return found[JSON_CHUNK], found.get(BINARY_CHUNK)
+    # Spaces should fill it up (4.4.3.2), but some programs fill it up with zeros, as the binary chunk.
+    return found[JSON_CHUNK].rstrip(b"\0"), found.get(BINARY_CHUNK)
 
 
 def _parsed(text: bytes) -> Table:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ldtrefl.base import budget
 from ldtrefl.base.errors import InputError
 from ldtrefl.files.mesh_textures import unpacked_picture
 from ldtrefl.files.stored_picture import StoredPicture
@@ -33,13 +34,13 @@ class Materials:
     faults: list[str] = field(default_factory=list)
     """What could not be read, a line each."""
     _made: dict[int, SurfaceMaterial] = field(default_factory=dict)
-    _pictures: dict[tuple[int, bool], StoredPicture] = field(default_factory=dict)
+    _pictures: dict[tuple[int, bool], StoredPicture | None] = field(default_factory=dict)
 
     def material(self, number: int | None) -> SurfaceMaterial:
         """A material by its number; None for that of primitives without one.
 
         Raises:
-            InputError: it is not sound, or a picture of it is damaged.
+            InputError: it is not sound, or a picture of it is larger than is allowed.
         """
         if number is None:
             return UNSAID
@@ -144,7 +145,8 @@ class Materials:
         )
 
     def _picture(self, entry: Table, where: str, *, with_alpha: bool) -> StoredPicture | None:
-        """The picture of a texture. None, and a line in ``faults``, if it has none of a kind that is read."""
+        """The picture of a texture. None, and a line in ``faults``, if it has none that can be read: the shape can be
+        shown all the same."""
         document = self.document
         sources = [document.extension(entry, name, where) for name in IMAGE_SOURCES]
         named = [table["source"] for table in sources if table is not None and "source" in table]
@@ -154,17 +156,30 @@ class Materials:
             return None
         image = document.entry("images", number, f"{where}.source")
         if (number, with_alpha) not in self._pictures:
-            data = self._data(image, f"images[{number}]")
-            try:
-                self._pictures[number, with_alpha] = unpacked_picture(data, with_alpha=with_alpha)
-            except InputError as error:
-                raise error.within(f"images[{number}]") from None
+            self._pictures[number, with_alpha] = self._unpacked(image, f"images[{number}]", with_alpha=with_alpha)
         return self._pictures[number, with_alpha]
 
-    def _data(self, image: Table, where: str) -> bytes:
+    def _unpacked(self, image: Table, where: str, *, with_alpha: bool) -> StoredPicture | None:
+        view = None
         if image.get("bufferView") is not None:
-            return bytes(self.document.view(image["bufferView"], f"{where}.bufferView"))
-        return self.document.file(image.get("uri"), f"{where}.uri")
+            view = self.document.view(image["bufferView"], f"{where}.bufferView")
+        try:
+            data = self.document.file(image.get("uri"), f"{where}.uri") if view is None else bytes(view)
+        except InputError as error:
+            self._miss(error)
+            return None
+        try:
+            return unpacked_picture(data, with_alpha=with_alpha)
+        except InputError as error:
+            self._miss(error.within(where))
+            return None
+
+    def _miss(self, error: InputError) -> None:
+        """Name a picture that cannot be had; memory that is refused is an error all the same."""
+        if budget.is_refusal(error):
+            raise error
+        if str(error) not in self.faults:
+            self.faults.append(str(error))
 
 
 def _wrap(sampler: Table, key: str, where: str) -> Wrap:

@@ -9,6 +9,7 @@ from pathlib import PurePosixPath
 import numpy as np
 from PIL import Image
 
+from ldtrefl.base import budget
 from ldtrefl.base.errors import InputError
 from ldtrefl.files.mesh_textures import unpacked_picture
 from ldtrefl.files.srgb import srgb_from_linear
@@ -48,7 +49,7 @@ class Pictures:
         try:
             return unpacked_picture(data, with_alpha=with_alpha)
         except InputError as error:
-            if "--memory" in str(error):
+            if budget.is_refusal(error):
                 raise
             self._miss(f"the picture '{name}' ({error})")
             return None

@@ -57,6 +57,20 @@ def test_other_versions_are_refused(version: object) -> None:
         document({"asset": {"version": version}})
 
 
+def test_what_needs_a_later_version_is_refused() -> None:
+    """``version`` says what a file was written by, ``minVersion`` what is needed to read it (3.2)."""
+    document({"asset": {"version": "2.5"}})
+    document({"asset": {"version": "2.1", "minVersion": "2.0"}})
+    with pytest.raises(InputError, match=r"asset\.minVersion: glTF 2\.0 is read, got 2\.1"):
+        document({"asset": {"version": "2.1", "minVersion": "2.1"}})
+
+
+def test_json_may_be_filled_up_with_zeros() -> None:
+    text = b'{"asset": {"version": "2.0"}}'
+    body = struct.pack("<I4s", len(text) + 3, b"JSON") + text + bytes(3)
+    assert Document(struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body, nothing_beside).root["asset"]
+
+
 def test_what_is_no_json_is_refused_in_one_line() -> None:
     deep = b'{"a": ' + b"[" * (DEEPEST + 1) + b"]" * (DEEPEST + 1) + b"}"
     for data in (b"{", b"[]", b"\xff\xfe\x00", b"[" * 100_000, deep):

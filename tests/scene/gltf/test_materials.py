@@ -1,8 +1,9 @@
-"""Materials: every number and texture of the file, its samplers and transforms; damaged pictures are refused."""
+"""Materials: every number and texture of the file, its samplers and transforms; pictures that are missing are named."""
 
 import dataclasses
 import io
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import pytest
 from PIL import Image
 
 import ldtrefl
+from ldtrefl.base import budget
 from ldtrefl.base.errors import InputError
 from ldtrefl.scene.gltf.container import Document
 from ldtrefl.scene.gltf.materials import Materials
@@ -128,15 +130,41 @@ def test_a_transform_is_offset_times_rotation_times_scale() -> None:
     np.testing.assert_allclose(corners, [[0, 1], [0, 0.5], [0.5, 0.5], [0.5, 1]], atol=1e-12)
 
 
-def test_a_picture_that_is_damaged_or_missing_is_refused(tmp_path: Path) -> None:
-    table = {"baseColorTexture": {"index": 0}}
-    for data in (picture()[:40], b"no picture"):
-        with pytest.raises(InputError, match=r"images\[0\]"):
-            material_of(textured(data=data), pbrMetallicRoughness=table)
-    file = textured()
-    file.tree["images"] = [{"uri": "wood.png"}]
-    with pytest.raises(InputError, match=r"images\[0\]\.uri: no file 'wood\.png' beside it"):
-        material_of(file, pbrMetallicRoughness=table)
+@pytest.mark.parametrize(
+    ("image", "says"),
+    [
+        (picture()[:40], r"images\[0\]: not a picture that can be read"),
+        (b"no picture", r"images\[0\]: not a picture that can be read"),
+        ({"uri": "wood.png"}, r"images\[0\]\.uri: no file 'wood\.png' beside it"),
+        ({"uri": "../wood.png"}, r"images\[0\]\.uri: no file '\.\./wood\.png' beside it"),
+        ({"uri": "https://a.b/wood.png"}, r"images\[0\]\.uri: only files beside it are read"),
+    ],
+    ids=["cut off", "damaged", "missing", "outside", "far away"],
+)
+def test_a_picture_that_is_damaged_or_missing_is_named(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, image: bytes | dict, says: str
+) -> None:
+    """As in files of all other kinds: the shape is shown, once said, without it."""
+    file = textured(data=image if isinstance(image, bytes) else None)
+    if isinstance(image, dict):
+        file.tree["images"] = [image]
+    texture = {"index": 0}
+    file.tree["materials"] = [{"pbrMetallicRoughness": {"baseColorTexture": texture}, "emissiveTexture": texture}]
+    file.quad()
+    file.tree["meshes"][0]["primitives"][0]["material"] = 0
+    assert ldtrefl.load_mesh(file.save(tmp_path, "a.glb")).parts[0].material.textures == []
+    assert [
+        record.getMessage() for record in caplog.records if re.search(rf"a\.glb: not shown: {says}", record.message)
+    ]
+    assert len(caplog.records) == 1
+
+
+def test_a_picture_that_is_too_large_is_refused() -> None:
+    budget.set_memory_limit(1 << 20)
+    large = io.BytesIO()
+    Image.new("L", (2000, 2000)).save(large, "PNG")
+    with pytest.raises(InputError, match=r"images\[0\]: .*--memory"):
+        material_of(textured(data=large.getvalue()), pbrMetallicRoughness={"baseColorTexture": {"index": 0}})
 
 
 def test_a_texture_without_a_picture_is_named() -> None:
