@@ -113,9 +113,17 @@ def _read(data: bytes, kind: str, beside: Resolver) -> tuple[list[Piece], list[s
         asset = Asset.read(data, beside.get)
         return placed_pieces(asset), asset.not_shown()
     if kind in ALONE:
-        return ALONE[kind](data)
-    reader = {"obj": pieces_of_obj, "ply": pieces_of_ply}.get(kind)
-    return reader(data, beside.get) if reader else _read_by_trimesh(data, kind, beside)
+        pieces, not_shown = ALONE[kind](data)
+    else:
+        reader = {"obj": pieces_of_obj, "ply": pieces_of_ply}.get(kind)
+        pieces, not_shown = reader(data, beside.get) if reader else _read_by_trimesh(data, kind, beside)
+    return pieces, not_shown + (["alpha of its colours"] if any(map(_hides_alpha, pieces)) else [])
+
+
+def _hides_alpha(piece: Piece) -> bool:
+    """Whether vertices have an alpha that counts for nothing. Many programs write some, and few mean it."""
+    is_opaque = piece.material.alpha_mode == "opaque"
+    return piece.colors is not None and is_opaque and bool((piece.colors[:, 3] < 1.0).any())
 
 
 def _read_by_trimesh(data: bytes, kind: str, beside: Resolver) -> tuple[list[Piece], list[str]]:

@@ -7,6 +7,7 @@ be built, where each stands. Colours are sRGB and belong to corners of triangles
 from __future__ import annotations
 
 import io
+import re
 import zipfile
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -33,6 +34,9 @@ BYTES_PER_BYTE = 40.0
 MOST_PLACED = 100_000
 """Objects that are placed: a few that are made of each other can stand for any number."""
 
+LONGEST_HEAD = 1 << 14
+"""Bytes of a model among which the prefixes of namespaces are looked for."""
+
 DEEPEST = 32
 """Objects made of objects made of objects."""
 
@@ -41,6 +45,17 @@ SHOWN = {
     *("triangles", "triangle", "components", "component", "basematerials", "base", "colorgroup", "color"),
     *("texture2d", "texture2dgroup", "tex2coord"),
 }
+
+MOST_NOTES = 20
+"""Lines about what is not shown: a file may hold any number of words."""
+
+SOLID = ("model", "solidsupport", "surface", "other")
+"""Types of objects that are shown; of supports, which a printer takes away again, a line says so."""
+
+EXTENSIONS = ("/core/2015/02", "/material/2015/02", "/production/2015/06")
+"""How the namespaces end of what is read."""
+
+PREFIX = re.compile(rb"""xmlns:([\w.-]+)\s*=\s*["']([^"'<]*)["']""")
 
 TILES: dict[str, Wrap] = {"wrap": "repeat", "mirror": "mirror", "clamp": "clamp", "none": "clamp"}
 
@@ -92,6 +107,8 @@ class _Package:
         if unit not in MILLIMETRES:
             raise InputError(f"{name}: unit '{unit[:40]}', allowed are {', '.join(MILLIMETRES)}")
         self.scales[name] = MILLIMETRES[unit]
+        for space in _required(root, text):
+            self.note(f"the extension '{space[:80]}' that it requires")
         for entry in root.iter():
             kind, key = _tag(entry), (name, entry.get("id", ""))
             if kind == "object":
@@ -107,8 +124,8 @@ class _Package:
                 self.textures[key] = None if picture is None else Texture(picture, wrap=(wraps[0], wraps[1]))
             elif kind == "item" and is_root:
                 self.items.append((_reference(entry, name), _transform(entry)))
-            elif kind not in SHOWN and f"the element '{kind}'" not in self.notes and len(self.notes) < len(SHOWN):
-                self.notes.append(f"the element '{kind}'")
+            elif kind not in SHOWN:
+                self.note(f"the element '{kind}'")
         for path in {place for parts in self.components.values() for (place, _), _ in parts} | {
             place for (place, _), _ in self.items
         }:
@@ -124,7 +141,9 @@ class _Package:
         for child in entry:
             if _tag(child) == "components":
                 self.components[key] = [(_reference(of, key[0]), _transform(of)) for of in child]
-            elif _tag(child) == "mesh" and entry.get("type", "model") in ("model", "solidsupport", "surface", "other"):
+            elif _tag(child) == "mesh" and entry.get("type", "model") not in SOLID:
+                self.note(f"objects of the type '{entry.get('type', '')[:40]}'")
+            elif _tag(child) == "mesh":
                 self.meshes[key] = _mesh(child, entry.get("pid", ""), int(entry.get("pindex", 0)))
 
     def placed(self, key: Key, matrix: np.ndarray, depth: int = 0) -> Iterator[tuple[Key, np.ndarray]]:
@@ -184,7 +203,7 @@ class _Package:
         return result
 
     def note(self, line: str) -> None:
-        if line not in self.notes:
+        if line not in self.notes and len(self.notes) < MOST_NOTES:
             self.notes.append(line)
 
 
@@ -219,6 +238,15 @@ def _pieces_of(archive: zipfile.ZipFile) -> tuple[list[Piece], list[str]]:
             budget.take(joining_bytes(made[key]), f"object {key[1]}")
             pieces += [moved(piece, matrix) for piece in made[key]]
     return pieces, package.notes + pictures.not_shown
+
+
+def _required(root: ElementTree.Element, text: bytes) -> list[str]:
+    """The namespaces of the extensions that a model requires, and that are not read."""
+    spaces = {
+        prefix.decode(): space.decode("utf-8", "replace") for prefix, space in PREFIX.findall(text[:LONGEST_HEAD])
+    }
+    found = [spaces.get(prefix, prefix) for prefix in root.get("requiredextensions", "").split()]
+    return [space for space in found if not space.endswith(EXTENSIONS)]
 
 
 def _root(archive: zipfile.ZipFile) -> str:

@@ -76,3 +76,20 @@ def test_damaged_files_are_a_mesh_or_a_line(tmp_path: Path) -> None:
     (tmp_path / "inside").mkdir()
     endings = {ending_of(tmp_path / "inside", number) for number in range(140)}
     assert endings == {"a mesh", "a line"}
+
+
+@pytest.mark.parametrize(("alpha", "is_said"), [(255, False), (254, True)])
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("a.off", "COFF\n3 1 0\n0 0 0 255 0 0 {0}\n1 0 0 255 0 0 255\n0 1 0 255 0 0 255\n3 0 1 2\n"),
+        ("a.obj", "v 0 0 0 255 0 0 {0}\nv 1 0 0 255 0 0 255\nv 0 1 0 255 0 0 255\nf 1 2 3\n"),
+    ],
+)
+def test_alpha_that_counts_for_nothing_is_named(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, name: str, text: str, alpha: int, is_said: bool
+) -> None:
+    (tmp_path / name).write_text(text.format(alpha))
+    mesh = ldtrefl.load_mesh(tmp_path / name)
+    np.testing.assert_allclose(mesh.colors[:, 3], [alpha / 255, 1, 1], rtol=1e-6)
+    assert ("not shown: alpha of its colours" in caplog.text) == is_said

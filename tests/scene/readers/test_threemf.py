@@ -97,6 +97,19 @@ def test_what_is_not_shown_is_named(tmp_path: Path, caplog: pytest.LogCaptureFix
     assert "not shown: the picture '3D/none.png'" in caplog.text
 
 
+def test_what_it_requires_and_supports_are_named(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    """Of the extensions that a file requires those that are read are not (core specification 2.3.1)."""
+    space = "http://schemas.microsoft.com/3dmanufacturing/beamlattice/2017/02"
+    support = mesh_object(2).replace('type="model"', 'type="support"')
+    head = f'requiredextensions="m p b" xmlns:b="{space}"'
+    mesh = loaded(tmp_path, mesh_object(1) + support, '<item objectid="1"/><item objectid="2"/>', head)
+    assert len(mesh.faces) == 1
+    assert [record.getMessage().partition("not shown: ")[2] for record in caplog.records] == [
+        f"the extension '{space}' that it requires",
+        "objects of the type 'support'",
+    ]
+
+
 @pytest.mark.parametrize(
     ("resources", "says"),
     [
