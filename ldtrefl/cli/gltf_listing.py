@@ -8,12 +8,9 @@ import numpy as np
 from rich.table import Table
 
 from ldtrefl.base.errors import printable
+from ldtrefl.cli.material_listing import MOST_ROWS, material_listing, numbers_in_words
 from ldtrefl.scene.gltf.asset import Asset
 from ldtrefl.scene.gltf.primitives import Primitive
-from ldtrefl.scene.surface_material import SurfaceMaterial, Texture
-
-MOST_ROWS = 40
-"""Rows of a table that are shown."""
 
 
 def listing(asset: Asset) -> Iterator[str | Table]:
@@ -23,13 +20,14 @@ def listing(asset: Asset) -> Iterator[str | Table]:
         InputError: something of it is not sound.
     """
     yield from _nodes(asset)
-    yield from _materials(asset)
+    count = len(asset.document.entries("materials"))
+    yield from material_listing(map(asset.materials.material, range(count)), count)
     for camera in asset.cameras():
         lens = f"fov_y {camera.fov_y:.4g}" if camera.is_perspective else "orthographic, not shown"
-        yield f"camera '{printable(camera.name)}': at {_numbers(camera.position)}, {lens}"
+        yield f"camera '{printable(camera.name)}': at {numbers_in_words(camera.position)}, {lens}"
     for light in asset.lights():
         unit = "lux" if light.kind == "directional" else "candela"
-        yield f"light '{printable(light.name)}': {light.kind}, {_numbers(light.color)} {unit}"
+        yield f"light '{printable(light.name)}': {light.kind}, {numbers_in_words(light.color)} {unit}"
     used = asset.document.root.get("extensionsUsed", [])
     if used:
         yield "extensions: " + printable(", ".join(map(str, used)))
@@ -61,31 +59,3 @@ def _attributes(primitive: Primitive) -> list[str]:
     found = [word for name, word in named.items() if getattr(primitive, name) is not None]
     sets = sum(uv is not None for uv in primitive.uvs)
     return found + ([f"{sets} UVs"] if sets else [])
-
-
-def _materials(asset: Asset) -> Iterator[str | Table]:
-    entries = asset.document.entries("materials")
-    if not entries:
-        return
-    table = Table("material", "base colour", "metallic", "roughness", "alpha", "sides", "textures")
-    for number in range(min(len(entries), MOST_ROWS)):
-        made = asset.materials.material(number)
-        row = (printable(made.name or str(number)), _numbers(made.base_color), f"{made.metallic:.3g}")
-        sides = "both" if made.double_sided else "front"
-        table.add_row(*row, f"{made.roughness:.3g}", made.alpha_mode, sides, ", ".join(_textures(made)) or "none")
-    yield f"{len(entries)} materials"
-    yield table
-
-
-def _textures(material: SurfaceMaterial) -> list[str]:
-    """What textures a material has, and how large."""
-    found = []
-    for name, value in vars(material).items():
-        if isinstance(value, Texture):
-            height, width = value.picture.pixels.shape[:2]
-            found.append(f"{name.removesuffix('_texture').replace('_', ' ')} {width} x {height}")
-    return found
-
-
-def _numbers(values: object) -> str:
-    return " ".join(f"{value:.4g}" for value in np.asarray(values).tolist())

@@ -6,7 +6,8 @@ import re
 import numpy as np
 from rich.console import Console
 
-from ldtrefl.cli.gltf_listing import MOST_ROWS, listing
+from ldtrefl.cli.gltf_listing import listing
+from ldtrefl.cli.material_listing import MOST_ROWS
 from ldtrefl.scene.gltf.asset import Asset
 from tests.scene.gltf.writer import QUAD, Written, nothing_beside
 

@@ -11,6 +11,7 @@ from rich.table import Table
 
 from ldtrefl.base import budget
 from ldtrefl.base.errors import printable
+from ldtrefl.cli.material_listing import material_listing
 from ldtrefl.cli.options import Memory, allow_memory, mesh_or_shape
 from ldtrefl.cli.printing import say
 from ldtrefl.device.launch import resolve_device, threading_note
@@ -19,6 +20,7 @@ from ldtrefl.scene.description import Scene
 from ldtrefl.scene.load import load_scene
 from ldtrefl.scene.mesh import Mesh
 from ldtrefl.scene.mesh_scene import is_gltf
+from ldtrefl.scene.surface_material import PLAIN
 from ldtrefl.world.device_mesh import DeviceMesh
 
 PLACE_IN_HELP = 40
@@ -80,10 +82,14 @@ def _scene_info(scene: Scene, memory: int) -> None:
 
 def _mesh_info(mesh: Mesh) -> None:
     low, high = mesh.bounds
-    textures = sum(len(part.material.textures) for part in mesh.parts)
     say(f"{len(mesh.faces)} triangles, {len(mesh.vertices)} vertices")
     say(f"from {low.tolist()} to {high.tolist()}")
-    say(f"parts: {len(mesh.parts)}, textures: {textures}, UVs: {'no' if mesh.uvs is None else 'yes'}")
+    has = {"UVs": mesh.uvs, "colours": mesh.colors}
+    say(f"vertices have {', '.join(name for name, values in has.items() if values is not None) or 'positions'}")
+    materials = list({part.material.key + part.material.name: part.material for part in mesh.parts}.values())
+    if materials != [PLAIN]:
+        for part in material_listing(materials, len(materials)):
+            say(part)
     maps = peel_mesh(DeviceMesh(mesh, resolve_device(None)), MESH_RESOLUTION, search="linear")
     crossings = ", ".join(f"{axis} {count}" for axis, count in maps.crossings().items())
     say(f"surfaces over one texel at {MESH_RESOLUTION}: {crossings}")

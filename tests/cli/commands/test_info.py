@@ -46,3 +46,20 @@ def test_a_preset_brings_its_lights(run: Callable[..., Done], scene_folder: Path
     text = (scene_folder / "scene.toml").read_text() + '\n[environment]\npreset = "sky"\n'
     (scene_folder / "sky.toml").write_text(text)
     assert "lights: those of the preset 'sky'" in run("info", "sky.toml").output
+
+
+def test_a_mesh_file_lists_its_materials(run: Callable[..., Done], scene_folder: Path) -> None:
+    """By the names that ``parts`` takes, each once."""
+    (scene_folder / "a.mtl").write_text("newmtl red\nKd 1 0 0\nnewmtl chrome trim\nPm 1\nPr 0.25\n")
+    (scene_folder / "a.obj").write_text(
+        "mtllib a.mtl\nv 0 0 0 1 1 1\nv 1 0 0 1 1 1\nv 0 1 0 1 1 1\n"
+        "usemtl red\ng a\nf 1 2 3\nusemtl chrome trim\nf 1 3 2\nusemtl red\ns 2\nf 1 2 3\n"
+    )
+    done = run("info", "a.obj")
+    assert done.status == 0 and "vertices have colours" in done.output and "2 materials" in done.output, done.output
+    rows = [line.split() for line in done.output.splitlines() if "opaque" in line]
+    assert [row[1:-1] for row in rows] == [
+        [*"red │ 1 0 0 │ 0 │ 1 │ opaque │ both │ none".split()],
+        [*"chrome trim │ 1 1 1 │ 1 │ 0.25 │ opaque │ both │ none".split()],
+    ]
+    assert "materials" not in run("info", "genus3").output
