@@ -216,7 +216,7 @@ struct Finishes {
         made.emission = model.emission;
         if (model.is_unlit) {
             layer = {grey(0.0f), grey(0.0f)};
-            made.emission = model.base;
+            made.emission = sum(model.emission, model.base);
             made.diffuse = grey(0.0f);
         } else if (model.has_mirror) {
             layer = layer_of(model.mirror, model.has_fresnel ? grey(1.0f) : model.mirror, shares);

@@ -135,8 +135,10 @@ def overridden(material: SurfaceMaterial, own: Material, *, is_of_file: bool) ->
     changes["base_color"] = (red * of_red, green * of_green, blue * of_blue)
     if own.picture is not None:
         changes["base_texture"] = Texture(own.picture)
-    if is_given(own.emission):
+    if is_given(own.emission) or material.is_unlit:  # what is unlit shows its base colour, and no emission of the file
         changes["emission"], changes["emission_texture"] = own.emission, None
+    if own.has_model or any(own.mirror):
+        changes["is_unlit"] = False
     if own.metallic is not None:
         changes["metallic"] = own.metallic
     if own.ior is not None:

@@ -24,8 +24,8 @@ def test_numbers_and_textures_are_named() -> None:
     texture = Texture(StoredPicture(np.zeros((2, 3, 3), np.uint8)))
     wood = SurfaceMaterial(name="wood\n", base_color=(0.1, 0.25, 1.0), roughness=0.5, emission_texture=texture)
     text = said([wood, PLAIN])
-    assert text.startswith("2 materials ") and "wood\\n 0.1 0.25 1 0 0.5 opaque emission 3 x 2" in text
-    assert " 1 1 1 1 0 1 opaque none" in text and said([]) == ""
+    assert text.startswith("2 materials ") and "wood\\n 0.1 0.25 1 0 0.5 opaque both emission 3 x 2" in text
+    assert " 1 1 1 1 0 1 opaque both none" in text and said([]) == ""
 
 
 def test_many_are_cut_short() -> None:

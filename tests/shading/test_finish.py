@@ -10,7 +10,7 @@ import pytest
 
 from ldtrefl.files.srgb import linear_from_srgb
 from ldtrefl.files.stored_picture import StoredPicture
-from ldtrefl.scene.description import Light, Lighting, Material
+from ldtrefl.scene.description import Environment, Light, Lighting, Material
 from ldtrefl.scene.surface_material import SurfaceMaterial, Texture, Wrap
 from tests.square import UVS, places, seen, square
 
@@ -90,6 +90,14 @@ def test_emission_and_what_is_unlit() -> None:
     unlit = replace(GLTF, base_color=(0.1, 0.2, 0.3), is_unlit=True, emission=(1.0, 1.0, 1.0))
     light = Light(kind="directional", direction=(0, 0, -1), radiance=(5, 5, 5))
     np.testing.assert_allclose(seen(square(unlit), lights=(light,))[0, 0], [0.1, 0.2, 0.3], rtol=1e-5)
+    # What the scene says counts: its emission is added, and a mirror or a metal is no longer unlit.
+    glowing = seen(square(unlit), Material(emission=(1.0, 0.0, 2.0)), lights=(light,))
+    np.testing.assert_allclose(glowing[0, 0], [1.1, 0.2, 2.3], rtol=1e-5)
+    around = Environment(sky=(0.4, 0.4, 0.4), ground=(0.4, 0.4, 0.4))
+    mirrored = seen(square(unlit), Material(mirror=0.5), environment=around)
+    np.testing.assert_allclose(mirrored[0, 0], [0.2] * 3, rtol=1e-5)
+    metal = seen(square(unlit), Material(metallic=1.0, roughness=0.0), environment=around)
+    np.testing.assert_allclose(metal[0, 0], [0.04, 0.08, 0.12], rtol=2e-2)
 
 
 def test_occlusion_dims_ambient_light_alone() -> None:
