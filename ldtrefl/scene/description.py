@@ -228,8 +228,8 @@ class Object:
 
     @property
     def is_reflector(self) -> bool:
-        """Whether the scene makes the object, or a part of it, a mirror."""
-        return any(any(material.mirror) for material in (self.material, *self.parts.values()))
+        """Whether the scene makes the object, or a part of it, a mirror. What its file reflects does not count."""
+        return any(any(self.material_of(part.material.name).mirror) for part in self.geometry.parts)
 
     def world_from_object(self) -> np.ndarray:
         """The object's place: (4, 4) float64, from the mesh's own coordinates to the world.

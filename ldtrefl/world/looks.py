@@ -18,7 +18,7 @@ import warp as wp
 from ldtrefl.base.errors import InputError
 from ldtrefl.files.srgb import srgb_from_linear
 from ldtrefl.files.stored_picture import StoredPicture
-from ldtrefl.scene.description import Reflection
+from ldtrefl.scene.description import Object, Reflection
 from ldtrefl.scene.material import Material, is_given
 from ldtrefl.scene.mesh import Mesh, Part
 from ldtrefl.scene.surface_material import PLAIN, SurfaceMaterial, Texture
@@ -125,6 +125,17 @@ def look_of(
     look.lets_through = int(lets_through)
     reflects = any(record.reflects or record.hides_back for record in records)
     return Look(look, reflects, lets_through, shines)
+
+
+def is_mirror(entry: Object, reflection: Reflection) -> bool:
+    """Whether rays may be mirrored at some part of an object: the scene makes it a mirror, or its file."""
+    is_of_file = has_material(entry.geometry)
+    for part in entry.geometry.parts:
+        own = entry.material_of(part.material.name)
+        material = overridden(part.material, own, is_of_file=is_of_file)
+        if not material.is_unlit and _may_send_rays(material, own, reflection):
+            return True
+    return False
 
 
 def overridden(material: SurfaceMaterial, own: Material, *, is_of_file: bool) -> SurfaceMaterial:

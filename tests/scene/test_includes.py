@@ -78,7 +78,8 @@ def test_what_is_said_of_nodes_and_materials_counts(tmp_path: Path) -> None:
     table = 'file = "room.glb"\nparts = { "she?t" = { mirror = 0.5 }, "paint" = { albedo = 0.25 } }'
     scene = loaded(tmp_path, CAMERA + f"[[include]]\n{table}\n")
     (sheet,) = scene.objects
-    assert sheet.material.mirror == (0.5, 0.5, 0.5) and sheet.is_reflector
+    assert sheet.material.mirror == (0.5, 0.5, 0.5)
+    assert not sheet.is_reflector, "all of it is of the material 'paint'"
     assert sheet.material_of("paint").albedo == (0.25, 0.25, 0.25)
     assert sheet.material_of("other") is sheet.material
 

@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 
 from ldtrefl.base.errors import InputError
+from ldtrefl.device import launch
 from ldtrefl.files.stored_picture import StoredPicture
-from ldtrefl.scene.description import Material
+from ldtrefl.scene.description import Camera, Material, Object, Reflection, Scene
 from ldtrefl.scene.mesh import Mesh, Part
 from ldtrefl.scene.surface_material import PLAIN, SurfaceMaterial, Texture
-from ldtrefl.world.looks import has_material, mesh_needs_look, overridden
+from ldtrefl.world.device_scene import DeviceScene
+from ldtrefl.world.looks import has_material, is_mirror, mesh_needs_look, overridden
 from tests.square import CORNERS, FACES, seen, square
 
 PICTURE = StoredPicture(np.full((1, 1, 3), 128, np.uint8))
@@ -87,3 +89,33 @@ def test_a_texture_of_the_scene_needs_texture_coordinates_and_one_of_a_file_does
     given.__dict__["picture"] = PICTURE  # as if it had been read
     with pytest.raises(InputError, match="no texture coordinates"):
         seen(square(GLTF, None), given)
+
+
+@pytest.mark.parametrize(
+    ("material", "own", "expected"),
+    [
+        (PLAIN, Material(), False),
+        (PLAIN, Material(mirror=0.5), True),
+        (PLAIN, Material(metallic=1.0), True),
+        (PLAIN, Material(metallic=1.0, roughness=0.5), False),
+        (replace(GLTF, metallic=1.0, roughness=0.1), Material(), True),
+        (replace(GLTF, metallic=1.0, roughness=0.1, is_unlit=True), Material(), False),
+        (replace(GLTF, metallic=1.0, roughness=1.0), Material(), False),
+        (replace(GLTF, metallic=1.0, roughness=1.0), Material(roughness=0.0), True),
+        (replace(GLTF, clearcoat=1.0), Material(), True),
+        (replace(GLTF, alpha_mode="blend", alpha=0.5), Material(), False),
+    ],
+)
+def test_mirrors_are_known_by_scene_and_file(material: SurfaceMaterial, own: Material, expected: bool) -> None:
+    """As rays are sent from it: those that go straight on through what blends are not mirrored."""
+    entry = Object(mesh=square(material), material=own)
+    assert is_mirror(entry, Reflection()) is expected
+    scene = Scene(camera=Camera(eye=(0, 0, 5), look_at=(0, 0, 0), up=(0, 1, 0)), objects=(entry,))
+    (sends_rays,) = DeviceScene(scene, launch.resolve_device(None)).is_reflector.tolist()
+    assert sends_rays is (expected or material.alpha_mode == "blend")
+
+
+def test_parts_that_a_mesh_does_not_have_make_no_mirror_of_it() -> None:
+    for name, expected in (("of*", True), ("glass", False)):
+        entry = Object(mesh=square(GLTF), parts={name: Material(mirror=0.9)})
+        assert is_mirror(entry, Reflection()) is expected and entry.is_reflector is expected

@@ -22,6 +22,7 @@ from ldtrefl.scene.mesh import Mesh
 from ldtrefl.scene.mesh_scene import is_gltf
 from ldtrefl.scene.surface_material import PLAIN
 from ldtrefl.world.device_mesh import DeviceMesh
+from ldtrefl.world.looks import is_mirror
 
 PLACE_IN_HELP = 40
 
@@ -73,8 +74,9 @@ def _scene_info(scene: Scene, memory: int) -> None:
         low, high = mesh.bounds
         size = np.linalg.norm(matrix[:3, :3], axis=0) * (high - low)
         source = entry.shape or (Path(entry.mesh).name if isinstance(entry.mesh, str) else "mesh")
-        row = (printable(entry.name), printable(source), str(len(mesh.faces)), "yes" if entry.is_reflector else "no")
-        table.add_row(*row, " x ".join(f"{side:.3g}" for side in size))
+        row = printable(entry.name), printable(source), str(len(mesh.faces))
+        mirrors = "yes" if is_mirror(entry, scene.reflection) else "no"
+        table.add_row(*row, mirrors, " x ".join(f"{side:.3g}" for side in size))
     say(table)
     allowed = budget.in_words(budget.memory_limit())
     say(f"memory: about {budget.in_words(memory)} for its shapes, meshes and pictures, {allowed} allowed")

@@ -17,6 +17,25 @@ def test_a_scene(run: Callable[..., Done]) -> None:
         assert words in done.output, done.output
 
 
+def test_metals_of_files_and_of_the_scene_are_mirrors(run: Callable[..., Done], scene_folder: Path) -> None:
+    (scene_folder / "a.mtl").write_text("newmtl chrome\nPm 1\nPr 0.1\n")
+    text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+    (scene_folder / "a.obj").write_text("mtllib a.mtl\nusemtl chrome\n" + text)
+    (scene_folder / "b.obj").write_text(text)
+    objects = [
+        ("of its file", "a", ""),
+        ("rough", "a", "roughness = 1.0"),
+        ("plaster", "b", ""),
+        ("gold", "b", "metallic = 1.0"),
+    ]
+    tables = [f'[[object]]\nname = "{n}"\nmesh = "{m}.obj"\n[object.material]\n{own}\n' for n, m, own in objects]
+    path = scene_folder / "mirrors.toml"
+    path.write_text("[camera]\neye = [0, 0, 5]\nlook_at = [0, 0, 0]\nup = [0, 1, 0]\n" + "".join(tables))
+    rows = [line.split("│") for line in run("info", "mirrors.toml").output.splitlines() if ".obj" in line]
+    told = {row[1].strip(): row[4].strip() for row in rows}
+    assert told == {"of its file": "yes", "rough": "no", "plaster": "no", "gold": "yes"}
+
+
 def test_closed_and_open_meshes(run: Callable[..., Done], scene_folder: Path) -> None:
     assert "closed: every texel has an even number" in run("info", "genus3").output
     sheet = trimesh.Trimesh(np.array([[0, 0, 0], [1, 0, 0.1], [0, 1, 0.2]]), [[0, 1, 2]])
