@@ -39,6 +39,10 @@ Up = Annotated[
         help="The axis of a mesh file that points up, such as y or -z; its kind's if not given.",
     ),
 ]
+Turn = Annotated[
+    float,
+    typer.Option("--turn", metavar="DEGREES", help="Turn a mesh about that axis, counterclockwise as seen from above."),
+]
 Mirror = Annotated[
     str | None, typer.Option("--mirror", metavar="self", help="'self' makes a mesh a mirror, on any stage.")
 ]
@@ -97,6 +101,7 @@ def scene_of(
     file: Path,
     on: str | None = None,
     up: str | None = None,
+    turn: float = 0.0,
     mirror: str | None = None,
     size: str | None = None,
     lenient: bool = False,
@@ -108,8 +113,8 @@ def scene_of(
     """
     if mirror not in (None, "self"):
         raise InputError(f"--mirror {mirror}: only 'self' is allowed")
-    mirror_self = mirror is not None
-    return load_scene(file, on=on, up=up, mirror_self=mirror_self, size=parsed_size(size), lenient=lenient)
+    pixels, mirror_self = parsed_size(size), mirror is not None
+    return load_scene(file, on=on, up=up, turn=turn, mirror_self=mirror_self, size=pixels, lenient=lenient)
 
 
 def parsed_size(size: str | None) -> tuple[int, int] | None:

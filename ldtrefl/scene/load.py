@@ -60,6 +60,7 @@ def load_scene(
     *,
     on: str | None = None,
     up: str | None = None,
+    turn: float = 0.0,
     mirror_self: bool = False,
     size: tuple[int, int] | None = None,
     lenient: bool = False,
@@ -67,7 +68,7 @@ def load_scene(
     """Read a scene file (TOML) with its meshes and its pictures, or make a scene of a mesh file.
 
     A mesh file is shown in a three-quarter view that fits, in soft studio light. Its objects stay where they are, but
-    for being turned so that z is up, and come first among the scene's.
+    for being turned so that z is up and as ``turn`` says, and come first among the scene's.
 
     Args:
         path: a scene file, whose name ends in ``.toml`` or has no ending, or else a mesh file.
@@ -75,6 +76,7 @@ def load_scene(
             beside it; "chrome", a floor with coloured balls that it mirrors itself.
         up: of a mesh file: its axis that points up, "x", "y", "z", "-x", "-y" or "-z". If not given, y of glTF and OBJ,
             z of others.
+        turn: of a mesh file: degrees by which it is turned about that axis, counterclockwise as seen from above.
         mirror_self: of a mesh file: make it a mirror.
         size: width and height of the picture in pixels, in place of the scene's own.
         lenient: of a glTF file: show what can be read of one that requires extensions which are not.
@@ -86,9 +88,10 @@ def load_scene(
     check_size(size)
     if not is_scene_file(path):
         with budget.account():
-            return mesh_scene(path, on, up, mirror_self=mirror_self, size=size, lenient=lenient)
-    for name, value in (("on", on), ("up", up), ("mirror_self", mirror_self or None), ("lenient", lenient or None)):
-        if value is not None:
+            return mesh_scene(path, on, up, turn=turn, mirror_self=mirror_self, size=size, lenient=lenient)
+    given = {"on": on, "up": up, "turn": turn, "mirror_self": mirror_self, "lenient": lenient}
+    for name, value in given.items():
+        if value not in (None, False, 0.0):
             raise InputError(f"{path}: '{name}' goes with a mesh file, this is a scene file")
     scene = _load_toml(path)
     if size is None:

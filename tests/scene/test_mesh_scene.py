@@ -59,6 +59,17 @@ def test_it_stands_upright(file: Path, up: str | None, height: float) -> None:
     assert box[1, 2] - box[0, 2] == height
 
 
+@pytest.mark.parametrize("up", FROM_Y_UP)
+@pytest.mark.parametrize("kind", ["obj", "glb"])
+def test_it_is_turned_about_what_is_up(tmp_path: Path, file: Path, kind: str, up: UpAxis) -> None:
+    """By 90 degrees what pointed at the camera, to -y, points to +x. Nothing else of it changes."""
+    path = file if kind == "obj" else gltf(tmp_path, name="sign.glb")
+    (before,), (after,) = (parts_of_file(path, up, turn=turn).objects for turn in (0.0, 90.0))
+    x, y, z = (before.geometry.vertices @ before.world_from_object()[:3, :3].T).T
+    turned = after.geometry.vertices @ after.world_from_object()[:3, :3].T
+    np.testing.assert_allclose(turned, np.column_stack([-y, x, z]), atol=1e-12)
+
+
 def test_the_object_has_the_name_of_the_file(file: Path) -> None:
     (entry,) = parts_of_file(file, "z").objects
     assert (entry.name, entry.mesh, entry.up_axis) == ("corner", str(file), "z")
@@ -76,6 +87,8 @@ def test_options_reach_the_scene(file: Path) -> None:
     [
         ({"on": "ball"}, r"unknown stage 'ball' \(allowed: chrome, mirror-ball, mirror-floor, studio\)"),
         ({"up": "w"}, r"unknown axis 'w' \(allowed: -x, -y, -z, x, y, z\)"),
+        ({"turn": float("nan")}, "turn: should be degrees from -360 to 360, got nan"),
+        ({"turn": 400.0}, "turn: should be degrees from -360 to 360, got 400"),
         ({"size": (0, 20)}, r"size: should be width and height, each a whole number from 1 to 16384, got \(0, 20\)"),
     ],
 )
@@ -137,6 +150,8 @@ def test_its_own_camera_and_lights_count_without_a_stage(tmp_path: Path) -> None
     assert len(alone.lights) == 1 and alone.lights[0].radiance == pytest.approx((1.0, 0.5, 0.0))
     middle = ldtrefl.render(alone).image[10, 15]
     np.testing.assert_allclose(middle / middle[0], np.array([1.05, 0.55, 0.05]) / 1.05, rtol=1e-3)
+    turned = ldtrefl.load_scene(path, size=(30, 20), turn=30.0)
+    assert (turned.camera, turned.lights) == (alone.camera, alone.lights), "what is looked at is turned"
     staged = ldtrefl.load_scene(path, on="studio", size=(30, 20))
     assert staged.lights == () and staged.camera.eye != alone.camera.eye
 

@@ -128,9 +128,9 @@ def test_what_a_gltf_file_holds_is_included(tmp_path: Path) -> None:
     for x, y in ((3.0, 0.0), (0.0, 2.0)):
         file.add("nodes", {"mesh": mesh, "translation": [x, y, 0.1], "rotation": [0.0, 0.6, 0.0, 0.8]})
     path = file.save(tmp_path)
-    for up in ("y", "-x"):
-        scene = mesh_scene(path, "mirror-ball", up, size=(36, 24))
-        save_scene(tmp_path / "made.toml", scene, include_of(path, up))
+    for up, turn in (("y", 0.0), ("-x", 0.0), ("y", 35.0), ("-x", -120.0)):
+        scene = mesh_scene(path, "mirror-ball", up, turn=turn, size=(36, 24))
+        save_scene(tmp_path / "made.toml", scene, include_of(path, up, turn))
         again = ldtrefl.load_scene(tmp_path / "made.toml")
         assert len(again.objects) == len(scene.objects) == 3 + 2
         np.testing.assert_array_equal(ldtrefl.render(again).image, ldtrefl.render(scene).image)

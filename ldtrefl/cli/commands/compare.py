@@ -19,6 +19,7 @@ from ldtrefl.cli.options import (
     SceneFile,
     Size,
     Threads,
+    Turn,
     Up,
     parsed_settings,
     scene_of,
@@ -59,6 +60,7 @@ def compare(
     ] = None,
     on: On = None,
     up: Up = None,
+    turn: Turn = 0.0,
     mirror: Mirror = None,
     size: Size = None,
     samples: Samples = None,
@@ -80,7 +82,7 @@ def compare(
         if count is not None:
             options[name] = {**options[name], "samples": count}
     folder = writable_folder(output or Path(scene.stem + "-compare"), make=True)
-    loaded = scene_of(scene, on, up, mirror, size, lenient)
+    loaded = scene_of(scene, on, up, turn, mirror, size, lenient)
     rows: dict[str, Row] = {}
     with progress_bar():
         _, truth = timed_frame(loaded, reference, device, options[reference])

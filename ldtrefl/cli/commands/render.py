@@ -24,6 +24,7 @@ from ldtrefl.cli.options import (
     SceneFile,
     Size,
     Threads,
+    Turn,
     Up,
     parsed_settings,
     scene_of,
@@ -53,6 +54,7 @@ def render(
     ] = None,
     on: On = None,
     up: Up = None,
+    turn: Turn = 0.0,
     mirror: Mirror = None,
     size: Size = None,
     samples: Samples = None,
@@ -84,9 +86,9 @@ def render(
         if is_scene_file(scene):
             raise InputError(f"--save-scene goes with a mesh file, {scene} is a scene file")
     with _maps_kept(cache, no_cache), budget.account():
-        loaded = scene_of(scene, on, up, mirror, size, lenient)
+        loaded = scene_of(scene, on, up, turn, mirror, size, lenient)
         if scene_file is not None:
-            save_scene(scene_file, loaded, include_of(scene, up_axis_of(scene, up)))
+            save_scene(scene_file, loaded, include_of(scene, up_axis_of(scene, up), turn))
         options = parsed_settings(settings) | ({} if samples is None else {"samples": samples})
         # Before they are passed on by name: one may be called as a parameter of Renderer is.
         find_method(loaded.reflection.method if method is None else method).configured(options)

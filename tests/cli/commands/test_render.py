@@ -44,10 +44,11 @@ OBJ = "v 0 0 0\nv 1 0 0\nv 0 2 0\nv 0 0 3\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 def test_a_mesh_on_a_stage_and_its_scene_file(run: Callable[..., Done], scene_folder: Path) -> None:
     """The scene file that is written makes the same picture."""
     (scene_folder / "thing.obj").write_text(OBJ)
-    stage = ("--on", "mirror-ball", "--up", "-y", "--mirror", "self", "--size", "36x24")
+    stage = ("--on", "mirror-ball", "--up", "-y", "--turn", "35", "--mirror", "self", "--size", "36x24")
     done = run("render", "thing.obj", *stage, "--save-scene", "made.toml")
     assert done.status == 0 and "thing.png: 36 x 24" in done.output and not done.errors, done
-    assert 'up_axis = "-y"' in (scene_folder / "made.toml").read_text()
+    made = (scene_folder / "made.toml").read_text()
+    assert 'up_axis = "-y"' in made and "rotate = [0.0, 0.0, 1.0, 35.0]" in made
     assert run("render", "made.toml").status == 0
     assert (scene_folder / "made.png").read_bytes() == (scene_folder / "thing.png").read_bytes()
 
@@ -64,6 +65,7 @@ def test_a_mesh_by_itself_says_what_is_up(run: Callable[..., Done], scene_folder
     [
         (("thing.obj", "--on", "ball"), "unknown stage 'ball' (allowed: chrome, mirror-ball, mirror-floor, studio)"),
         (("scene.toml", "--on", "studio"), "scene.toml: 'on' goes with a mesh file, this is a scene file"),
+        (("scene.toml", "--turn", "30"), "scene.toml: 'turn' goes with a mesh file, this is a scene file"),
         (("scene.toml", "--save-scene", "a.toml"), "--save-scene goes with a mesh file, scene.toml is a scene file"),
         (("thing.obj", "--save-scene", "a.txt"), "a.txt: a scene file's name ends in .toml"),
         (("thing.fbx",), "thing.fbx: no such mesh"),
