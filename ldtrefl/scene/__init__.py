@@ -9,7 +9,7 @@
     scene_text.py       a scene as the text of a scene file
     mesh.py             a triangle mesh, checked; mesh_arrays.py goes over its arrays
     shared_geometries.py  one mesh for all objects of the same file or shape
-    normals.py          vertex normals, with welding.py, two_sided.py and winding.py
+    normals.py          vertex normals, with welding.py, two_sided.py and winding.py; smoothing.py gives them to facets
     outliers.py         the few triangles far outside a mesh's bulk
     convexity.py        whether rays that leave a mesh can come back to it
     solid.py            whether backs of a mesh can be seen, with closed_check.py

@@ -46,6 +46,7 @@ from ldtrefl.scene.material import Material
 from ldtrefl.scene.mesh import Mesh
 from ldtrefl.scene.placement import UpAxis, placement
 from ldtrefl.scene.readers import load_mesh
+from ldtrefl.scene.smoothing import smoothed_facets
 
 MAX_SIDE = 16384
 """The most pixels along a side of an image."""
@@ -142,8 +143,9 @@ class Object:
     rotate: Annotated[tuple[Number, Number, Number, Number], BeforeValidator(plain)] = (0.0, 0.0, 1.0, 0.0)
     """Axis and degrees."""
     translate: Vector = (0.0, 0.0, 0.0)
-    smooth: Flag = True
-    """Shading normals: interpolated, or the facet's."""
+    smooth: Flag | None = None
+    """Shading normals. None: as the mesh says. True: interpolated, those of facets that the mesh's file leaves flat, as
+    all of STL files, too. False: the facet's."""
     material: Material = Material()
     parts: Mapping[str, Material] = Field(default_factory=dict)
     """Names of materials of the mesh's file, or patterns of such with * and ?: what is said of those parts in place of
@@ -179,7 +181,8 @@ class Object:
         """The mesh in the object's own coordinates; objects with the same file or shape share one."""
         if self.shape is not None:
             return shapes.make(self.shape, self.params)
-        return self.mesh if isinstance(self.mesh, Mesh) else load_mesh(str(self.mesh))
+        mesh = self.mesh if isinstance(self.mesh, Mesh) else load_mesh(str(self.mesh))
+        return smoothed_facets(mesh) if self.smooth else mesh
 
     def share_geometry(self, mesh: Mesh) -> None:
         """Take the mesh of an object of the same file or shape: it is then neither made nor counted again."""
@@ -197,7 +200,7 @@ class Object:
             raise unknown_name("field of an object", field, known)
         try:
             changed = dataclasses.replace(self, **values)
-            if not {"mesh", "shape", "params"} & set(changes):
+            if not {"mesh", "shape", "params", "smooth"} & set(changes):
                 changed.share_geometry(self.geometry)
             changed.world_from_object()  # refuses sizes that are not allowed
         except InputError as error:

@@ -9,17 +9,11 @@ from __future__ import annotations
 import numpy as np
 
 from ldtrefl.scene.mesh import Mesh, Part
-from ldtrefl.scene.normals import split_by_side
 from ldtrefl.scene.piece import Piece
-
-BYTES_PER_VERTEX = 160.0
-"""A vertex while pieces are joined, welded and smoothed, the mesh itself included; measured."""
+from ldtrefl.scene.smoothing import BYTES_PER_TRIANGLE, BYTES_PER_VERTEX, smoothed
 
 BYTES_PER_COLOR = 55.0
-"""What a vertex takes besides if it has a colour, likewise."""
-
-BYTES_PER_TRIANGLE = 90.0
-"""A triangle, likewise."""
+"""What a vertex takes besides if it has a colour; measured."""
 
 
 def joining_bytes(pieces: list[Piece]) -> float:
@@ -56,20 +50,7 @@ def _with_normals(mesh: Mesh, pieces: list[Piece], first_vertex: np.ndarray, fir
         return mesh.with_normals(normals)
     number = np.repeat(np.arange(len(pieces)), np.diff(first_vertex))
     triangles = np.flatnonzero(np.repeat(is_without, np.diff(first_triangle)))
-    every = len(triangles) == len(mesh.faces)
-    sources, split, smooth = split_by_side(
-        mesh.vertices, mesh.faces if every else mesh.faces[triangles], number if len(pieces) > 1 else None
-    )
-    is_smooth = is_without[number[sources]]
-    normals = np.where(is_smooth[:, None], smooth, normals[sources])
-    normals.flags.writeable = False
-    if len(sources) == len(mesh.vertices):
-        return mesh.with_normals(normals)
-    faces = mesh.faces.copy()
-    faces[triangles] = split
-    uvs, *more = (None if of is None else of[sources] for of in (mesh.uvs, mesh.second_uvs, mesh.colors, mesh.tangents))
-    named = dict(zip(("second_uvs", "colors", "tangents"), more, strict=True))
-    return Mesh(mesh.vertices[sources], faces, normals, uvs, mesh.parts, **named)
+    return smoothed(mesh.with_normals(normals), is_without[number], triangles, number if len(pieces) > 1 else None)
 
 
 def _more_of_vertices(pieces: list[Piece]) -> dict[str, np.ndarray | None]:

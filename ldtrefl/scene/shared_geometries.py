@@ -24,6 +24,10 @@ class HasGeometry(Protocol):
         """Of the shape."""
 
     @property
+    def smooth(self) -> bool | None:
+        """True if facets that the mesh leaves flat are to be smooth."""
+
+    @property
     def geometry(self) -> Mesh:
         """The mesh that these name, made when it is first asked for."""
 
@@ -35,7 +39,7 @@ class SharedGeometries:
     """The meshes of objects, by what they are made of."""
 
     def __init__(self) -> None:
-        self._made: dict[tuple[str | None, str | Mesh | None, str], Mesh] = {}
+        self._made: dict[tuple[str | None, str | Mesh | None, str, bool], Mesh] = {}
 
     def give(self, entry: HasGeometry) -> None:
         """Give an object its mesh, unless it has one: that of an object before it, or else its own.
@@ -46,7 +50,7 @@ class SharedGeometries:
         if "geometry" in vars(entry):
             return
         params = repr(sorted(entry.params.items(), key=repr)) if entry.params else ""
-        source = entry.shape, entry.mesh, params
+        source = entry.shape, entry.mesh, params, entry.shape is None and entry.smooth is True
         if source in self._made:
             entry.share_geometry(self._made[source])
         else:

@@ -52,7 +52,7 @@ def fill_records(
     albedo[_is_colored_by_file(materials, meshes, mesh_of)] = 1.0
     # An object that only glows needs no normals.
     is_lit = (np.maximum(albedo, mirror).max(axis=1, initial=0.0) > 0.0) | (look_of >= 0)
-    smooth = np.array([source.smooth for source in sources], bool) & is_lit
+    smooth = np.array([source.smooth is not False for source in sources], bool) & is_lit
     needs_normals = smooth if skip_attributes else np.ones_like(smooth)
     pictures, picture_of = _pictures(materials)
     # Objects of one kind share all that is not their own.

@@ -167,7 +167,7 @@ def _meshes_of(mi: Any, entry: Object, properties_of: Callable[[Object, Part], A
     place = entry.world_from_object()
     vertices = mesh.vertices @ place[:3, :3].T + place[:3, 3]
     # Mitsuba normalises what it has interpolated, as ours does: lengths are kept.
-    normals = mesh.normals @ np.linalg.inv(place[:3, :3]) if entry.smooth else None
+    normals = mesh.normals @ np.linalg.inv(place[:3, :3]) if entry.smooth is not False else None
     firsts = [part.first_triangle for part in mesh.parts]
     return [
         _mesh(mi, vertices, mesh.faces[first:end], normals, mesh.uvs, properties_of(entry, part))

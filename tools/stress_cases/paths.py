@@ -242,7 +242,7 @@ def _points(values: np.ndarray) -> wp.array:
 def _world_normals(entry: Object) -> np.ndarray:
     """(m, 3, 3) normals of the corners of an object's triangles, in the world; 0 where it is not smooth."""
     mesh = entry.geometry
-    if not entry.smooth:
+    if entry.smooth is False:
         return np.zeros((len(mesh.faces), 3, 3))
     return mesh.normals[mesh.faces] @ np.linalg.inv(entry.world_from_object()[:3, :3])
 

@@ -136,6 +136,6 @@ def touching(
 def near_edges(scene: Scene, paths: Paths) -> np.ndarray:
     """(h, w) bool: pixels a pixel or less from one whose path meets other objects, or other facets of those that are
     not smooth."""
-    is_flat = np.array([not entry.smooth for entry in scene.objects] + [False])
+    is_flat = np.array([entry.smooth is False for entry in scene.objects] + [False])
     met = np.stack([e.object + len(is_flat) * np.where(is_flat[e.object], e.triangle, 0) for e in paths.ends], axis=-1)
     return near_edge(met)
