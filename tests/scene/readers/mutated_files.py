@@ -86,6 +86,12 @@ PLY = PLY_HEADER % b"ascii" + (
 
 BINARY_PLY = PLY_HEADER % b"binary_little_endian" + bytes(60) + b"\3" + bytes(12) + b"\6" + bytes(24) + b"\0\0"
 
+STL = b"solid a\n" + 2 * (
+    b"facet normal 0 0 1\n outer loop\n  vertex 0 0 0\n  vertex 1 0 0\n  vertex 0 1 0\n endloop\nendfacet\n"
+)
+
+BINARY_STL = bytes(80) + b"\2\0\0\0" + 2 * (bytes(24) + b"\0\0\x80\x3f" + bytes(12) + b"\0\0\x80\x3f" + bytes(6))
+
 MODEL = (
     b'<model unit="inch" xmlns:m="m"><resources><m:colorgroup id="5"><m:color color="#FF0000"/></m:colorgroup>'
     b'<object id="1" pid="5" pindex="0"><mesh><vertices><vertex x="0" y="0" z="0"/><vertex x="1" y="0" z="0"/>'
@@ -125,9 +131,9 @@ def mutated(data: bytes, chance: random.Random) -> bytes:
 def ending_of(folder: Path, number: int) -> str:
     """Write a damaged file with others beside it, read it, and say how that ended: 'a mesh' or 'a line'."""
     chance = random.Random(number)
-    kind = ("obj", "obj", "obj", "off", "ply", "bply", "3mf")[number % 7]
+    kind = ("obj", "obj", "obj", "off", "ply", "bply", "3mf", "stl", "bstl")[number % 9]
     path = folder / f"a.{kind.removeprefix('b')}"
-    data = {"obj": OBJ, "off": OFF, "ply": PLY, "bply": BINARY_PLY, "3mf": MODEL}[kind]
+    data = {"obj": OBJ, "off": OFF, "ply": PLY, "bply": BINARY_PLY, "3mf": MODEL, "stl": STL, "bstl": BINARY_STL}[kind]
     picture = io.BytesIO()
     Image.effect_noise((8, 8), 50).convert("RGB").save(picture, "PNG")
     spoils_mesh = kind != "obj" or chance.random() < 0.5

@@ -74,7 +74,7 @@ def test_a_changed_file_is_read_again(tmp_path: Path) -> None:
 def test_damaged_files_are_a_mesh_or_a_line(tmp_path: Path) -> None:
     """A few of those that the script of ``mutated_files.py`` makes by the thousand."""
     (tmp_path / "inside").mkdir()
-    endings = {ending_of(tmp_path / "inside", number) for number in range(140)}
+    endings = {ending_of(tmp_path / "inside", number) for number in range(180)}
     assert endings == {"a mesh", "a line"}
 
 
