@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     )
     from ldtrefl.scene.load import load_scene
     from ldtrefl.scene.mesh import Mesh
+    from ldtrefl.scene.picture import Picture
     from ldtrefl.scene.readers.mesh_files import load_mesh
     from ldtrefl.tracing.batch import Hits
     from ldtrefl.tracing.bvh import Raycaster
@@ -65,6 +66,7 @@ __all__ = [
     "Material",
     "Mesh",
     "Object",
+    "Picture",
     "Raycaster",
     "Reflection",
     "Renderer",
@@ -95,6 +97,7 @@ _HOMES = {
     "Material": "scene.description",
     "Mesh": "scene.mesh",
     "Object": "scene.description",
+    "Picture": "scene.picture",
     "Raycaster": "tracing.bvh",
     "Reflection": "scene.description",
     "Renderer": "renderer",

@@ -1,21 +1,22 @@
-"""Pictures written to files: PNG (sRGB, 8 bits) and EXR (linear float32), by OpenImageIO."""
+"""Pictures written to files: PNG and EXR by OpenImageIO, JPEG and WebP by Pillow."""
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 
 import numpy as np
 import OpenImageIO as oiio
-import xxhash
+from PIL import Image
 
 from ldtrefl.base.errors import InputError
-from ldtrefl.base.standard_error import caught_stderr
 from ldtrefl.files.atomic_write import replaceable, writable_folder, written_whole
-from ldtrefl.files.picture_reading import BYTES_AT_ONCE, read_rows
-from ldtrefl.files.srgb import srgb_from_linear
+from ldtrefl.files.picture_format import JPEG, LOSSY, QUALITY, WRITABLE, PictureFormat
+from ldtrefl.files.tone_mapping import ToneMapping
+from ldtrefl.files.verified_rows import blocks, write_verified
 
-WRITABLE = (".png", ".exr")
-"""Endings of the names of pictures that can be written."""
+LONGEST_SIDES = {".webp": 16383, ".jpg": 65535, ".jpeg": 65535}
+"""Pixels along a side that a format can hold, by the ending of the file's name."""
 
 
 def check_writable(path: str | Path) -> Path:
@@ -27,7 +28,7 @@ def check_writable(path: str | Path) -> Path:
     """
     path = Path(path)
     if path.suffix.lower() not in WRITABLE:
-        raise InputError(f"{path}: a picture's name ends in {' or '.join(WRITABLE)}")
+        raise InputError(f"{path}: a picture's name ends in {', '.join(WRITABLE[:-1])} or {WRITABLE[-1]}")
     folder = replaceable(path).parent
     if not folder.is_dir():
         raise InputError(f"{path}: the folder {folder} does not exist")
@@ -38,62 +39,74 @@ def check_writable(path: str | Path) -> Path:
     return path
 
 
-def save_image(path: str | Path, image: np.ndarray) -> None:
-    """Write linear ``(h, w, 3)`` radiance, row 0 at the top, as PNG (encoded to sRGB, clipped) or EXR (float32).
+def save_image(
+    path: str | Path,
+    image: np.ndarray,
+    *,
+    exposure: float = 0.0,
+    tone_mapping: ToneMapping = "none",
+    bits: int = 8,
+    quality: int | None = None,
+    dither: bool | None = None,
+) -> None:
+    """Write linear radiance as PNG, JPEG or WebP (what a display shows, encoded to sRGB) or EXR (float32, as it is).
 
-    The file is read back and compared: the libraries that write do not notice every full disk.
+    Args:
+        path: where. The ending of its name says what is written.
+        image: ``(h, w, 3)``, row 0 at the top; or ``(h, w, 4)`` with alpha in the last channel, by which the others are
+            multiplied, such as ``Frame.cutout``. A JPEG cannot hold alpha.
+        exposure: stops; each shows everything twice as bright.
+        tone_mapping: "none" (cut off at 1), "agx" (as Blender 4) or "aces" (ACES 1.3).
+        bits: of a channel of a PNG, 8 or 16.
+        quality: of JPEG and WebP, 1 to 100, 92 if not given. A WebP of 100 loses nothing.
+        dither: whether a PNG's values are dithered, or rounded. If not given, those of 8-bit tone-mapped pictures are
+            dithered.
 
     Raises:
-        InputError: the path cannot be written, or the image is not ``(h, w, 3)``.
+        InputError: the path cannot be written, the image is of another shape, or an option is not allowed or does not
+            go with the file's ending.
     """
     path = check_writable(path)
+    options = {"exposure": exposure, "tone_mapping": tone_mapping, "bits": bits, "quality": quality, "dither": dither}
+    chosen, ending = PictureFormat.checked(path, **options), path.suffix.lower()
     image = np.asarray(image, np.float32)
-    if image.ndim != 3 or image.shape[2] != 3 or image.size == 0:
-        raise InputError(f"{path}: an image is (height, width, 3), got {image.shape}")
-    is_png = path.suffix.lower() == ".png"
-    with written_whole(path) as scratch, caught_stderr():
-        digest = _write(scratch, image, is_png)
-        if digest is None or digest != _digest_of_file(scratch, image.shape, is_png):
-            raise InputError(f"{path}: could not be written ({oiio.geterror() or 'is the disk full?'})")
+    if image.ndim != 3 or image.shape[2] not in (3, 4) or image.size == 0:
+        raise InputError(f"{path}: an image is (height, width, 3 or 4), got {image.shape}")
+    if ending in JPEG and image.shape[2] == 4:
+        raise InputError(f"{path}: a JPEG cannot be transparent, PNG, WebP and EXR can")
+    if max(image.shape[:2]) > LONGEST_SIDES.get(ending, max(image.shape)):
+        raise InputError(f"{path}: has {max(image.shape[:2])} pixels along a side, at most {LONGEST_SIDES[ending]} fit")
+    if ending == ".exr":
+        write_verified(path, _spec(image, oiio.FLOAT), lambda top, bottom: image[top:bottom])
+    elif ending in LOSSY:
+        data = _compressed(path, image, chosen)
+        with written_whole(path) as scratch:
+            scratch.write_bytes(data)
+    else:
+        spec = _spec(image, oiio.UINT8 if chosen.bits == 8 else oiio.UINT16)
+        write_verified(path, spec, lambda top, bottom: chosen.encoded(image[top:bottom], top))
 
 
-def _encode(rows: np.ndarray, is_png: bool) -> np.ndarray:
-    """Rows of an image as the file holds them."""
-    return np.round(srgb_from_linear(rows) * 255.0).astype(np.uint8) if is_png else np.ascontiguousarray(rows)
-
-
-def _write(path: Path, image: np.ndarray, is_png: bool) -> bytes | None:
-    """Write a file: a hash of the pixels that it should hold, None if the writer has reported a fault."""
+def _spec(image: np.ndarray, kind: oiio.BASETYPE) -> oiio.ImageSpec:
+    """What OpenImageIO is told of a file."""
     height, width, channels = image.shape
-    spec = oiio.ImageSpec(width, height, channels, oiio.UINT8 if is_png else oiio.FLOAT)
-    spec.attribute("oiio:ColorSpace", "sRGB" if is_png else "linear")
-    writer = oiio.ImageOutput.create(str(path))
-    if not (writer and writer.open(str(path), spec)):
-        return None
-    digest = xxhash.xxh3_128()
-    is_good = True
-    step = max(1, BYTES_AT_ONCE // image[0].nbytes)
-    for top in range(0, height, step):
-        rows = _encode(image[top : top + step], is_png)
-        digest.update(rows.data)
-        is_good = is_good and writer.write_scanlines(top, top + len(rows), 0, rows)
-    return digest.digest() if writer.close() and is_good else None
+    spec = oiio.ImageSpec(width, height, channels, kind)
+    spec.attribute("oiio:ColorSpace", "linear" if kind == oiio.FLOAT else "sRGB")
+    if channels == 4 and kind != oiio.FLOAT:
+        spec.attribute("oiio:UnassociatedAlpha", 1)
+    return spec
 
 
-def _digest_of_file(path: Path, shape: tuple[int, ...], is_png: bool) -> bytes | None:
-    """The same hash of the pixels that a file does hold, None if it is not an image of this shape."""
-    reader = oiio.ImageInput.open(str(path))
-    if reader is None:
-        return None
+def _compressed(path: Path, image: np.ndarray, chosen: PictureFormat) -> bytes:
+    """The bytes of a JPEG or a WebP. Colours are as sharp as brightness: mirrors show edges between colours."""
+    parts = [chosen.encoded(image[top:bottom]) for top, bottom in blocks(len(image), image[0].nbytes)]
+    data, quality = io.BytesIO(), QUALITY if chosen.quality is None else chosen.quality
+    picture = Image.fromarray(np.concatenate(parts))
     try:
-        spec = reader.spec()
-        if (spec.height, spec.width, spec.nchannels) != shape:
-            return None
-        digest = xxhash.xxh3_128()
-        for _, rows in read_rows(reader, 0, 3, oiio.UINT8 if is_png else oiio.FLOAT):
-            if rows is None:
-                return None
-            digest.update(np.ascontiguousarray(rows).data)
-        return digest.digest()
-    finally:
-        reader.close()
+        if path.suffix.lower() in JPEG:
+            picture.save(data, "JPEG", quality=quality, subsampling=0)
+        else:
+            picture.save(data, "WEBP", quality=quality, lossless=quality == 100)
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: could not be written ({error})") from error
+    return data.getvalue()

@@ -44,6 +44,7 @@ from ldtrefl.scene.environment import Environment
 from ldtrefl.scene.layout import Layout
 from ldtrefl.scene.material import Material
 from ldtrefl.scene.mesh import Mesh
+from ldtrefl.scene.picture import Picture
 from ldtrefl.scene.placement import UpAxis, placement
 from ldtrefl.scene.readers import load_mesh
 from ldtrefl.scene.smoothing import smoothed_facets
@@ -285,6 +286,7 @@ class Scene:
     lights: Annotated[tuple[Light, ...], Field(alias="light", max_length=MAX_LIGHTS)] = ()
     objects: Annotated[tuple[Object, ...], Field(alias="object", max_length=MAX_OBJECTS)] = ()
     reflection: Reflection = Field(default_factory=Reflection)
+    picture: Picture = Field(default_factory=Picture)
     expect: dict[str, Expectation] = Field(default_factory=dict)
 
     @functools.cached_property

@@ -13,6 +13,7 @@ from ldtrefl.files.atomic_write import replaceable, written_whole
 from ldtrefl.scene.description import Environment, Material, Reflection, Scene
 from ldtrefl.scene.includes import Include
 from ldtrefl.scene.mesh import Mesh
+from ldtrefl.scene.picture import Picture
 
 FILES = ("mesh", "texture", "image", "file")
 """Keys that name files."""
@@ -36,6 +37,8 @@ COMMENTS = {
     "object.material.albedo": "the colour of its scattered light",
     "object.material.emission": "radiance, added, unlit",
     "object.material.mirror": "specular reflectance; above 0 makes it a mirror",
+    "picture.exposure": "stops",
+    "picture.tone_mapping": "none, agx or aces",
 }
 """What stands beside a key where it comes first."""
 
@@ -102,6 +105,8 @@ def scene_text(scene: Scene, path: Path, include: Include | None = None) -> str:
             lines.table("object.material", "[object.material]", material, is_part=True)
     if scene.reflection != Reflection():
         lines.table("reflection", "[reflection]", _written(scene.reflection))
+    if scene.picture != Picture():
+        lines.table("picture", "[picture]", _written(scene.picture))
     return "\n".join(lines.written) + "\n"
 
 

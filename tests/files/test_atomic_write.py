@@ -41,6 +41,8 @@ def write_maps(path: Path) -> None:
 WRITERS: dict[str, Writer] = {
     "a.png": lambda path: ldtrefl.save_image(path, noise()),
     "a.exr": lambda path: ldtrefl.save_image(path, noise(50, 80)),
+    "a.jpg": lambda path: ldtrefl.save_image(path, noise(), quality=100),
+    "a.webp": lambda path: ldtrefl.save_image(path, noise(), quality=100),
     "a.npz": write_maps,
     "report.md": write_report,
 }

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import ldtrefl
-from ldtrefl import Environment, Light, Material, Mesh, Object, Reflection, Scene
+from ldtrefl import Environment, Light, Material, Mesh, Object, Picture, Reflection, Scene
 from ldtrefl.scene.composed import composed
 from ldtrefl.scene.mesh_scene import include_of, mesh_scene
 from ldtrefl.scene.scene_text import check_scene_writable, save_scene, scene_text
@@ -54,6 +54,7 @@ def test_all_that_a_scene_may_hold_is_written(tmp_path: Path) -> None:
             Object(shape="plane", material=Material(double_sided=True)),
         ),
         reflection=Reflection(method="bvh", max_bounces=2),
+        picture=Picture(exposure=-0.5, tone_mapping="agx"),
     )
     save_scene(tmp_path / "all.toml", scene)
     again = ldtrefl.load_scene(tmp_path / "all.toml")
