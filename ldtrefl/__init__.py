@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from ldtrefl.device.launch import set_threads
     from ldtrefl.device.progress import progress_to
     from ldtrefl.device.stats import Stats
+    from ldtrefl.files.layer_writing import save_layers
     from ldtrefl.files.map_cache import MapCache, keep_maps_in
     from ldtrefl.files.picture_reading import load_image
     from ldtrefl.files.picture_writing import save_image
@@ -80,6 +81,7 @@ __all__ = [
     "progress_to",
     "render",
     "save_image",
+    "save_layers",
     "set_memory_limit",
     "set_threads",
 ]
@@ -111,6 +113,7 @@ _HOMES = {
     "progress_to": "device.progress",
     "render": "renderer",
     "save_image": "files.picture_writing",
+    "save_layers": "files.layer_writing",
     "set_memory_limit": "base.budget",
     "set_threads": "device.launch",
 }

@@ -19,14 +19,15 @@ from ldtrefl.base import budget
 from ldtrefl.base.errors import InputError
 from ldtrefl.device import build_ahead, launch
 from ldtrefl.device.stats import Stats
-from ldtrefl.frame.antialiasing import BEYOND, antialiased, filtered
+from ldtrefl.frame.antialiasing import BEYOND, Pictures, antialiased, antialiased_alike, filtered
 from ldtrefl.frame.camera_shading import shade_gbuffer
 from ldtrefl.frame.composite import composed
 from ldtrefl.frame.first_frame import OF_EVERY_SCENE, OF_SAMPLES
 from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.history import FrameHistory, FrameParts, Reusable
+from ldtrefl.frame.layers import SMALLER, Layers, LightBand, light_of
 from ldtrefl.frame.reflected_light import ReflectedLight
-from ldtrefl.frame.result import SMALLER, BandedFrame, Frame, WholeFrame, inner_rows
+from ldtrefl.frame.result import BandedFrame, Frame, LightAgain, WholeFrame, inner_rows
 from ldtrefl.frame.sample_points import SamplePoints, camera_rays, regions_of, seen_at
 from ldtrefl.frame.skip_options import skip_options_of
 from ldtrefl.frame.visibility import BAND_PIXELS, draw_gbuffer, draw_in_bands
@@ -205,24 +206,27 @@ class Renderer:
         parts, image = self._with_samples(parts, stats)
         self._history.keep(scene, camera, parts)
         self._count(scene, parts.gbuffer.reflector_mask, stats)
-        return Frame(image, stats, WholeFrame.of(parts))
+        return Frame(image, stats, WholeFrame.of(parts, self._light_again(scene, camera)))
 
     def _in_bands(self, camera: Camera) -> Frame:
         scene, stats = self._as_it_stands(), Stats()
         image = np.empty((camera.height, camera.width, 3), np.float32)
         mask, counts = (np.empty((camera.height, camera.width), kind) for kind in (bool, np.uint16))
-        beyond = 0 if self._sampling.samples == 1 else BEYOND
-        for parts in self._bands(camera, stats, beyond):
+        for parts in self._bands(camera, stats, self._beyond):
             sampled, band = self._with_samples(parts, stats)
-            # A row that two bands have is right in the one that has its neighbours, too.
-            inner = inner_rows(parts.gbuffer.band, camera, beyond)
-            within = slice(inner.start - parts.gbuffer.band.first_row, inner.stop - parts.gbuffer.band.first_row)
+            inner, within = inner_rows(parts.gbuffer.band, camera, self._beyond)
             image[inner] = band[within]
             mask[inner] = parts.gbuffer.reflector_mask[within]
             counts[inner] = 1 if sampled.antialiased is None else sampled.antialiased.counts[within]
         self._history.keep_view(scene, camera)
         self._count(scene, mask, stats)
-        return Frame(image, stats, BandedFrame(mask, counts, self._bands_again(scene, camera)))
+        again = self._bands_again(scene, camera), self._light_again(scene, camera)
+        return Frame(image, stats, BandedFrame(mask, counts, *again))
+
+    @property
+    def _beyond(self) -> int:
+        """Rows beyond a band that its own depend on."""
+        return 0 if self._sampling.samples == 1 else BEYOND
 
     def _bands_again(self, scene: DeviceScene, camera: Camera) -> Callable[[], Iterator[FrameParts]]:
         """A function that renders the bands again by a new renderer, whatever moves meanwhile."""
@@ -232,6 +236,34 @@ class Renderer:
             return Renderer(description, self._name, device, **self._options)._bands(camera, Stats())
 
         return bands
+
+    def _light_again(self, scene: DeviceScene, camera: Camera) -> LightAgain:
+        """A function that renders what a frame is composed of by a new renderer, whatever moves meanwhile."""
+        # The function goes with the frame: it must not hold on to this renderer and its maps.
+        description, name, device, options = scene.scene, self._name, str(scene.device), self._options
+
+        def bands(cutout: bool) -> Iterator[LightBand]:
+            return Renderer(description, name, device, **options)._light(camera, cutout)
+
+        return bands
+
+    def _light(self, camera: Camera, cutout: bool) -> Iterator[LightBand]:
+        """What an image is composed of, band by band. From now on the method keeps all bounces."""
+        method, most = self._method, 1
+        if isinstance(method, RayMethod):
+            method.keeps_bounces, most = True, method.most_bounces
+        for parts in self._bands(camera, Stats(), self._beyond):
+            light = light_of(parts, most, cutout=cutout)
+            if self._sampling.samples > 1:
+                pictures_at = functools.partial(self._light_at, parts.gbuffer, most, cutout)
+                centres = _on_device(light, parts.gbuffer)
+                found = antialiased_alike(parts, centres, self._sampling, pictures_at)
+                light = {name: filtered(found[name], centres[name], self._sampling).numpy() for name in found}
+            yield LightBand(parts, *inner_rows(parts.gbuffer.band, camera, self._beyond), light)
+
+    def _light_at(self, image: GBuffer, most: int, cutout: bool, place: wp.array) -> Pictures:
+        """What is seen at (n,) vec2d points of a band's image, in its pixels."""
+        return _on_device(light_of(self._parts_at(image, Stats(), place), most, cutout=cutout), image)
 
     def _bands(self, camera: Camera, stats: Stats, beyond: int = 0) -> Iterator[FrameParts]:
         """A large image from top to bottom; nothing of it, nor of the last frame, is kept. Each band goes on for
@@ -285,14 +317,19 @@ class Renderer:
 
     def _seen(self, image: GBuffer, stats: Stats, place: wp.array) -> wp.array:
         """(n,) vec3: the radiance that (n,) vec2d points of a band's image see, in its pixels."""
-        rays, of_samples = camera_rays(image, place), Stats()
-        regions = regions_of(image, rays)
-        tracer = self._method.sample_tracer(image.scene, regions.shown, of_samples)
-        points = seen_at(image, place, rays, regions, tracer, by_bounds=self._skip.bounds)
-        parts = self._parts(points, None, of_samples)
+        of_samples = Stats()
+        parts = self._parts_at(image, of_samples, place)
         for name in RAY_COUNTERS:
             stats.count(name, of_samples.counters.get(name, 0))
         return composed(parts)
+
+    def _parts_at(self, image: GBuffer, stats: Stats, place: wp.array) -> FrameParts:
+        """What these points see, and what is reflected there."""
+        rays = camera_rays(image, place)
+        regions = regions_of(image, rays)
+        tracer = self._method.sample_tracer(image.scene, regions.shown, stats)
+        points = seen_at(image, place, rays, regions, tracer, by_bounds=self._skip.bounds)
+        return self._parts(points, None, stats)
 
     def _count(self, scene: DeviceScene, mask: np.ndarray, stats: Stats) -> None:
         stats.count("pixels", mask.size)
@@ -321,6 +358,11 @@ class Renderer:
     def texel_sizes(self, resolution: int) -> np.ndarray:
         """(objects,) length in the world of a texel of each object's maps at ``resolution``."""
         return np.array([entry.longest_side / resolution for entry in self._as_it_stands().objects])
+
+
+def _on_device(pictures: Layers, gbuffer: GBuffer) -> Pictures:
+    """(n,) vec3 of each picture."""
+    return {name: wp.array(values, dtype=wp.vec3, device=gbuffer.scene.device) for name, values in pictures.items()}
 
 
 def render(scene: Scene, method: str | None = None, device: str | None = None, **options: object) -> Frame:

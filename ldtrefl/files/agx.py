@@ -6,6 +6,8 @@ channel, and an *outset* makes what is left as colourful as it was. What then li
 
 This is computed as by the script that Blender's table is made by ("AgXBasesRGB" of Z. E. Zhou's AgX_LUT_Gen), not
 looked up in the table (``AgX_Base_sRGB.cube``), nor by a polynomial. At the table's own points it agrees to 2e-6.
+Between them Blender interpolates: a picture of the teapot scene differs by a quarter of a byte's step in the mean, by
+1.8 steps at most.
 
 Channels come first: arrays are (3, ...) float32.
 """

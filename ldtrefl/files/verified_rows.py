@@ -13,7 +13,10 @@ import xxhash
 from ldtrefl.base.errors import InputError
 from ldtrefl.base.standard_error import caught_stderr
 from ldtrefl.files.atomic_write import written_whole
-from ldtrefl.files.picture_reading import BYTES_AT_ONCE, read_rows
+from ldtrefl.files.picture_reading import read_rows
+
+BYTES_AT_ONCE = 8 << 20
+"""Bytes of radiance that are worked on at a time: to develop it takes ten times as much."""
 
 Rows = Callable[[int, int], np.ndarray]
 """``rows(top, bottom)``: the (bottom - top, width, channels) pixels of some rows, as the file holds them."""

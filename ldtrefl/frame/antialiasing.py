@@ -11,7 +11,7 @@ The order of all sums is fixed, so no bit depends on the number of threads.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,6 +41,13 @@ Smooth::blend(&centre.data[begin][0], 3 * width, 3 * (width - 2), weights.data, 
 
 RadianceAt = Callable[[wp.array], wp.array]
 """(n,) vec2d points of a band in its pixels -> (n,) vec3 the radiance seen there."""
+
+Pictures = Mapping[str, wp.array]
+"""Pictures of a band that are sampled alike, by name: (pixels,) or (points,) vec3. The first says where samples are
+needed."""
+
+PicturesAt = Callable[[wp.array], Pictures]
+"""(n,) vec2d points of a band in its pixels -> the same pictures there."""
 
 
 @dataclass(frozen=True)
@@ -171,53 +178,58 @@ def put_pixels(
 class _Samples:
     """The samples of a band's pixels."""
 
-    def __init__(self, sampling: Sampling, shape: tuple[int, int], centre: wp.array, radiance_at: RadianceAt) -> None:
+    def __init__(self, sampling: Sampling, shape: tuple[int, int], centre: Pictures, pictures_at: PicturesAt) -> None:
+        self._chosen_by = next(iter(centre))
         self._levels = levels(sampling.samples)
         self._offsets = places(sampling.samples)
         self._adaptive = sampling.adaptive
-        self._width, self._device = shape[1], centre.device
-        self._centre, self._radiance_at = centre, radiance_at
+        self._width, self._device = shape[1], centre[self._chosen_by].device
+        self._centre, self._pictures_at = centre, pictures_at
 
-    def shares(self, pixels: np.ndarray, counts: np.ndarray) -> wp.array:
-        """(m * NEIGHBOURS,) vec3: what (m,) ``pixels`` count in those about them. ``counts``, (all pixels,), is filled
-        in where they are sampled."""
-        shares = wp.empty(len(pixels) * int(NEIGHBOURS), dtype=wp.vec3, device=self._device)
+    def shares(self, pixels: np.ndarray, counts: np.ndarray) -> Pictures:
+        """(m * NEIGHBOURS,) vec3 of each picture: what (m,) ``pixels`` count in those about them. ``counts``, (all
+        pixels,), is filled in where they are sampled."""
+        size = len(pixels) * int(NEIGHBOURS)
+        shares = {name: wp.empty(size, dtype=wp.vec3, device=self._device) for name in self._centre}
         at_once = max(1, TOGETHER // self._levels[-1].samples)
         for begin in range(0, len(pixels), at_once):
             part = pixels[begin : begin + at_once]
-            self._sample(part, counts, shares[begin * int(NEIGHBOURS) : (begin + len(part)) * int(NEIGHBOURS)])
+            of_part = slice(begin * int(NEIGHBOURS), (begin + len(part)) * int(NEIGHBOURS))
+            self._sample(part, counts, {name: array[of_part] for name, array in shares.items()})
         return shares
 
-    def _sample(self, pixels: np.ndarray, counts: np.ndarray, shares: wp.array) -> None:
+    def _sample(self, pixels: np.ndarray, counts: np.ndarray, shares: Pictures) -> None:
         """Sample pixels at the second level, and those that need it at the last."""
         first, last = self._levels[1], self._levels[-1]
         if not self._adaptive:
             first = last
         every = np.arange(len(pixels))
         few = self._traced(pixels, 1, first.samples)
-        nothing = wp.empty(0, dtype=wp.vec3, device=self._device)
+        nothing = dict.fromkeys(self._centre, wp.empty(0, dtype=wp.vec3, device=self._device))
         counts[pixels] = first.samples
         self._weigh(pixels, every, few, nothing, first, shares)
         if first is not last:
-            varied = groups_of_contrast(few, first.samples - 1)
+            varied = groups_of_contrast(few[self._chosen_by], first.samples - 1)
             if len(varied):
                 counts[pixels[varied]] = last.samples
                 many = self._traced(pixels[varied], first.samples, last.samples)
                 self._weigh(pixels[varied], varied, few, many, last, shares)
 
-    def _traced(self, pixels: np.ndarray, begin: int, end: int) -> wp.array:
-        """(m * (end - begin),) vec3: the samples from ``begin`` to ``end`` of (m,) pixels."""
+    def _traced(self, pixels: np.ndarray, begin: int, end: int) -> Pictures:
+        """(m * (end - begin),) vec3 of each picture: the samples from ``begin`` to ``end`` of (m,) pixels."""
         offsets = wp.array(self._offsets[begin:end], dtype=wp.vec2d, device=self._device)
         place = wp.empty(len(pixels) * (end - begin), dtype=wp.vec2d, device=self._device)
         launch.launch(place_samples, len(pixels), [self._on_device(pixels), self._width, offsets, place], self._device)
-        return self._radiance_at(place)
+        return self._pictures_at(place)
 
     def _weigh(
-        self, pixels: np.ndarray, numbers: np.ndarray, few: wp.array, many: wp.array, level: Level, shares: wp.array
+        self, pixels: np.ndarray, numbers: np.ndarray, few: Pictures, many: Pictures, level: Level, shares: Pictures
     ) -> None:
         weights = wp.array(level.weights.ravel(), dtype=float, device=self._device)
-        inputs = [self._on_device(pixels), self._on_device(numbers), self._centre, few, many, weights, shares]
-        launch.launch(weigh_samples, len(pixels), inputs, self._device)
+        places = [self._on_device(pixels), self._on_device(numbers)]
+        for name, centre in self._centre.items():
+            inputs = [*places, centre, few[name], many[name], weights, shares[name]]
+            launch.launch(weigh_samples, len(pixels), inputs, self._device)
 
     def _on_device(self, numbers: np.ndarray) -> wp.array:
         return wp.array(numbers.astype(np.int32), dtype=wp.int32, device=self._device)
@@ -243,22 +255,33 @@ def antialiased(parts: FrameParts, centre: wp.array, sampling: Sampling, radianc
         sampling: more than one sample.
         radiance_at: traces more samples.
     """
-    gbuffer, device = parts.gbuffer, centre.device
-    shape = gbuffer.shape
+    of_image = antialiased_alike(parts, {"": centre}, sampling, lambda place: {"": radiance_at(place)})
+    return of_image[""]
+
+
+def antialiased_alike(
+    parts: FrameParts, centres: Pictures, sampling: Sampling, pictures_at: PicturesAt
+) -> dict[str, Antialiased]:
+    """The same of several pictures of a band, all sampled where the first needs it."""
+    gbuffer, centre = parts.gbuffer, next(iter(centres.values()))
+    device, shape = centre.device, gbuffer.shape
     counts = np.ones(gbuffer.pixel_count, np.uint16)
     if sampling.adaptive:
         pixels = pixels_of_contrast(gbuffer, parts.reflected.hits, centre, sampling.samples)
     else:
         pixels = pixels_in_blocks(np.ones(shape, bool))
-    shares = _Samples(sampling, shape, centre, radiance_at).shares(pixels, counts)
+    shares = _Samples(sampling, shape, centres, pictures_at).shares(pixels, counts)
     number_of = np.full(gbuffer.pixel_count, -1, np.int32)
     number_of[pixels] = np.arange(len(pixels), dtype=np.int32)
     apart = wp.array(_filtered_apart(pixels, shape), dtype=wp.int32, device=device)
-    radiance = wp.empty(apart.shape[0], dtype=wp.vec3, device=device)
     numbers = wp.array(number_of, dtype=wp.int32, device=device)
-    inputs = [apart, shape[1], numbers, centre, shares, _weights(sampling, device), radiance]
-    launch.launch(filter_pixels, apart.shape[0], inputs, device)
-    return Antialiased(apart, radiance, counts.reshape(shape))
+    made = {}
+    for name, picture in centres.items():
+        radiance = wp.empty(apart.shape[0], dtype=wp.vec3, device=device)
+        inputs = [apart, shape[1], numbers, picture, shares[name], _weights(sampling, device), radiance]
+        launch.launch(filter_pixels, apart.shape[0], inputs, device)
+        made[name] = Antialiased(apart, radiance, counts.reshape(shape))
+    return made
 
 
 def filtered(found: Antialiased, centre: wp.array, sampling: Sampling) -> wp.array:

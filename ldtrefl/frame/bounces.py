@@ -240,6 +240,20 @@ class LaterBounce:
 
 
 @dataclass(frozen=True, eq=False)
+class KeptBounce:
+    """A bounce as layers of a picture are made of it."""
+
+    numbers: np.ndarray
+    """(m,) int32: of the rays that were followed in it, among the first bounce's."""
+    rays: RayBuffer
+    """Those rays as they set out."""
+    hits: HitBuffer
+    """Where they ended."""
+    brought: wp.array
+    """(n,) vec3: what each of the first bounce's rays has brought by the end of this one."""
+
+
+@dataclass(frozen=True, eq=False)
 class FollowedRays:
     """Rays of the first bounce, and what became of them."""
 
@@ -255,6 +269,8 @@ class FollowedRays:
     """(n,) int32: the mirror that each goes on from after that; -1 where it ends."""
     later: tuple[LaterBounce, ...] = ()
     """The bounces after the first."""
+    kept: tuple[KeptBounce, ...] = ()
+    """All bounces, if they are kept."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -266,6 +282,8 @@ class RayFollower:
     limits: BounceLimits
     skip: SkipOptions
     stats: Stats
+    keeps_bounces: bool = False
+    """Whether each bounce is kept as it was, too."""
 
     def first_regions(self, rays: RayBuffer) -> Regions:
         """Which objects the first rays can meet."""
@@ -285,7 +303,7 @@ class RayFollower:
         radiance, numbers = wp.zeros(count, dtype=wp.vec3, device=device), np.arange(count, dtype=np.int32)
         hits, onwards = self._bounce(rays, regions, None, radiance, is_last=self.limits.most == 1)
         followed = FollowedRays(rays, regions.sets, hits, radiance, onwards.source)
-        later = []
+        later, kept = [], [KeptBounce(numbers, rays, hits, wp.clone(radiance))] if self.keeps_bounces else []
         with budget.given_back():
             for bounce in range(1, self.limits.most):
                 left = np.flatnonzero(onwards.source.numpy() >= 0)
@@ -297,7 +315,9 @@ class RayFollower:
                 is_last = bounce + 1 == self.limits.most
                 hits, onwards = self._bounce(going, regions, numbers, radiance, is_last=is_last)
                 later.append(LaterBounce(numbers, RayEnds.of(going, hits)))
-        return replace(followed, later=tuple(later))
+                if self.keeps_bounces:
+                    kept.append(KeptBounce(numbers, going, hits, wp.clone(radiance)))
+        return replace(followed, later=tuple(later), kept=tuple(kept))
 
     def _bounce(
         self, rays: RayBuffer, regions: Regions, numbers: np.ndarray | None, radiance: wp.array, *, is_last: bool

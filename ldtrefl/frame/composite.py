@@ -62,6 +62,16 @@ def composed(parts: FrameParts) -> wp.array:
     return image
 
 
+def reflected_to_camera(parts: FrameParts, radiance: wp.array) -> np.ndarray:
+    """(h, w, 3) float32: what reflectors send to the camera of (m,) radiance that reaches them; 0 elsewhere."""
+    gbuffer = parts.gbuffer
+    device, pixels = gbuffer.scene.device, gbuffer.reflector_pixels
+    image = wp.zeros(gbuffer.pixel_count, dtype=wp.vec3, device=device)
+    launch.launch(add_reflection, pixels.shape[0], [pixels, parts.shaded.mirror, radiance, image], device)
+    picture: np.ndarray = image.numpy().reshape(*gbuffer.shape, 3)
+    return picture
+
+
 def reflection_picture(shape: tuple[int, int], pixels: wp.array, radiance: wp.array) -> np.ndarray:
     """(h, w, 3) float32: the (m,) radiance of each of the (m,) ``pixels``; 0 elsewhere."""
     picture = np.zeros((shape[0] * shape[1], 3), np.float32)

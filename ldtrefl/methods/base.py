@@ -208,6 +208,14 @@ class RaylessMethod(Method):
 class RayMethod(Method):
     """A way to compute reflections by rays."""
 
+    keeps_bounces = False
+    """Whether each bounce is to be kept as it was, too, for the layers of a picture."""
+
+    @property
+    def most_bounces(self) -> int:
+        """How often a ray may be mirrored."""
+        return self.config.limits(self.scene.scene).most if isinstance(self.config, RayConfig) else 1
+
     @abc.abstractmethod
     def reflect_rays(
         self, gbuffer: GBuffer, rays: RayBuffer, reusable: Reusable | None, stats: Stats

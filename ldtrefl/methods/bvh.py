@@ -45,7 +45,8 @@ class Bvh(RayMethod):
         self, gbuffer: GBuffer, rays: RayBuffer, reusable: Reusable | None, stats: Stats
     ) -> ReflectedLight:
         """Trace the reflected rays; while the camera stays, those that may end elsewhere than in the last frame."""
-        follower = RayFollower(gbuffer, self, self.config.limits(self.scene.scene), self.skip, stats)
+        limits = self.config.limits(self.scene.scene)
+        follower = RayFollower(gbuffer, self, limits, self.skip, stats, self.keeps_bounces)
         followed = followed_with_history(follower, rays, follower.first_regions(rays), reusable)
         radiance = summed_by_pixel(gbuffer.reflector_pixels, rays, followed.radiance)
         return ReflectedLight(radiance, FirstHits.of(gbuffer, followed), followed)

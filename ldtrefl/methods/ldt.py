@@ -158,7 +158,8 @@ class Ldt(RayMethod):
         self, gbuffer: GBuffer, rays: RayBuffer, reusable: Reusable | None, stats: Stats
     ) -> ReflectedLight:
         """Cull, peel what is left on first need, march."""
-        follower = RayFollower(gbuffer, self, self.config.limits(self.scene.scene), self.skip, stats)
+        limits = self.config.limits(self.scene.scene)
+        follower = RayFollower(gbuffer, self, limits, self.skip, stats, self.keeps_bounces)
         regions = follower.first_regions(rays)
         chosen = dict(self.tracer.chosen)
         serving = reusable if self._serves_again(reusable, follower.limits) else None

@@ -64,7 +64,7 @@ def test_a_new_file_is_a_new_command(
         ("render scene.toml --set error=0", "error: should be greater than 0"),
         ("render scene.toml --set cull=none", "'safe' or 'flat'"),
         ("render scene.toml -o none/a.png", "does not exist"),
-        ("render scene.toml -o a.bmp", ".png or .exr"),
+        ("render scene.toml -o a.bmp", ".jpeg or .webp"),
         ("render scene.toml --threads 0", "threads"),
         ("render scene.toml --device cuda:77", "no device"),
         ("render scene.toml --memory much", "--memory"),

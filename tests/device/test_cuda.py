@@ -11,6 +11,7 @@ from ldtrefl.device import launch
 from ldtrefl.frame.bounces import shade_hits_kernel
 from ldtrefl.frame.camera_shading import shade_pixels_kernel, shade_reflectors_kernel
 from ldtrefl.frame.searched_pixels import search_pixels_kernel
+from ldtrefl.frame.seen_surfaces import describe_kernel
 from ldtrefl.ldt.searches import TRACERS
 from ldtrefl.renderer import Renderer  # noqa: F401  (imports every module that defines kernels)
 from ldtrefl.tracing.batch import batch_kernel
@@ -33,6 +34,8 @@ def all_kernels() -> list[wp.Kernel]:
         batch_kernel(tracer, 1, True)
         closest_hits_kernel(tracer, 1)
         search_pixels_kernel(tracer, 1)
+    for has_looks in (False, True):
+        describe_kernel(has_looks)
     for tracer, looks in itertools.product((NOTHING, BVH, *TRACERS.values()), LOOKS):
         shade_hits_kernel(tracer, *looks)
         shade_pixels_kernel(tracer, *looks)

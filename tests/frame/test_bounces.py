@@ -1,5 +1,7 @@
 """Reflected rays followed bounce by bounce, against closed forms; and the sums of several rays of one pixel."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 import warp as wp
@@ -69,6 +71,37 @@ def test_later_bounces_tell_which_rays_they_are_and_where_they_end() -> None:
     is_bottom = later.ends.object.numpy()[sent_back] == flat_mirror.GROUND
     assert is_bottom.sum() > 20
     np.testing.assert_allclose(t[is_bottom], t_first[is_bottom], rtol=1e-5)
+
+
+def test_bounces_are_kept_if_it_is_asked_for() -> None:
+    """After each bounce what its rays met is added, mirrored as often as they were; the sum has the usual bits."""
+    given = flat_mirror.scene(place=(0.1, 0.2, 0.8), box_mirror=0.5)
+    gbuffer, shaded = flat_mirror.seen_and_shaded(flat_mirror.on_device(given))
+    usual = flat_mirror.follower(gbuffer, 3)
+    keeping = dataclasses.replace(usual, keeps_bounces=True)
+    regions = usual.first_regions(shaded.rays)
+    followed, kept = usual.follow(shaded.rays, regions), keeping.follow(shaded.rays, regions)
+    assert followed.kept == () and len(kept.kept) == 3
+    np.testing.assert_array_equal(kept.radiance.numpy(), followed.radiance.numpy())
+    np.testing.assert_array_equal(kept.kept[-1].brought.numpy(), followed.radiance.numpy())
+    assert kept.kept[0].rays is shaded.rays and np.array_equal(
+        kept.kept[0].numbers, np.arange(len(kept.kept[0].numbers))
+    )
+    for bounce, later in zip(kept.kept[1:], kept.later, strict=True):
+        np.testing.assert_array_equal(bounce.numbers, later.numbers)
+        np.testing.assert_array_equal(bounce.hits.object.numpy(), later.ends.object.numpy())
+    expected = flat_mirror.reflection(given, 3)
+    place = np.argsort(shaded.rays.pixel.numpy())
+    chosen = place[np.searchsorted(shaded.rays.pixel.numpy()[place], expected.pixels)]
+    brought = np.stack([bounce.brought.numpy()[chosen] for bounce in kept.kept])
+    is_miss = np.isinf(expected.distance)
+    is_box = expected.object == flat_mirror.BOX
+    first = np.where(is_miss[:, None], flat_mirror.environment(expected.direction), flat_mirror.BOX_DIRECT)
+    np.testing.assert_allclose(brought[0][is_miss | is_box], first[is_miss | is_box], rtol=2e-5)
+    again = is_box & (expected.later_object[:, 0] == flat_mirror.GROUND)
+    assert again.sum() > 20
+    second = np.broadcast_to(0.5 * flat_mirror.GROUND_DIRECT, (again.sum(), 3))
+    np.testing.assert_allclose((brought[1] - brought[0])[again], second, rtol=1e-4)
 
 
 def test_rays_of_bounces_that_need_too_much_memory_are_refused() -> None:

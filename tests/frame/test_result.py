@@ -16,11 +16,13 @@ from ldtrefl.frame.bounce_hits import FirstHits
 from ldtrefl.frame.camera_shading import shade_gbuffer
 from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.history import FrameParts
+from ldtrefl.frame.layers import LightBand, light_of
 from ldtrefl.frame.reflected_light import ReflectedLight
-from ldtrefl.frame.result import BandedFrame, Frame, WholeFrame, rows_of
-from ldtrefl.frame.visibility import draw_in_bands
+from ldtrefl.frame.result import BandedFrame, Frame, WholeFrame, inner_rows, rows_of
+from ldtrefl.frame.visibility import draw_gbuffer, draw_in_bands
 from ldtrefl.scene.description import Scene
 from ldtrefl.tracing.nothing import no_shadows
+from ldtrefl.world.camera import Band, CameraView
 from tests.frame import flat_mirror
 
 
@@ -42,6 +44,14 @@ class CountedSource:
         self.asked.append("hits")
         return None
 
+    def cutout(self, image: np.ndarray) -> np.ndarray:
+        self.asked.append("cutout")
+        return np.concatenate([image, np.full((2, 3, 1), 0.5, np.float32)], axis=2)
+
+    def layers(self, image: np.ndarray, *, cutout: bool) -> dict[str, np.ndarray]:
+        self.asked.append("layers of a cutout" if cutout else "layers")
+        return {"beauty": image}
+
 
 def test_what_a_frame_gives_is_made_once_and_when_it_is_asked_for() -> None:
     source = CountedSource()
@@ -49,7 +59,19 @@ def test_what_a_frame_gives_is_made_once_and_when_it_is_asked_for() -> None:
     assert source.asked == []
     assert frame.reflection is frame.reflection and frame.reflector_mask is frame.reflector_mask
     assert frame.hits is None and frame.hits is None
-    assert source.asked == ["reflection", "reflector_mask", "hits"]
+    assert frame.alpha is frame.alpha and frame.cutout is frame.cutout and (frame.alpha == 0.5).all()
+    assert source.asked == ["reflection", "reflector_mask", "hits", "cutout"]
+
+
+def test_layers_are_made_anew_each_time() -> None:
+    source = CountedSource()
+    frame = Frame(np.ones((2, 3, 3), np.float32), Stats(), source)
+    assert frame.layers() is not frame.layers() and frame.layers(cutout=True)["beauty"] is frame.image
+    assert source.asked == ["layers", "layers", "layers of a cutout"]
+
+
+def no_bands(cutout: bool) -> Iterator[LightBand]:
+    raise AssertionError("nothing is rendered again")
 
 
 def test_a_whole_frame_has_radiance_at_its_pixels() -> None:
@@ -57,11 +79,15 @@ def test_a_whole_frame_has_radiance_at_its_pixels() -> None:
     pixels = wp.array([4, 1], dtype=wp.int32, device=device)
     radiance = wp.array([(1, 2, 3), (4, 5, 6)], dtype=wp.vec3, device=device)
     reflector = wp.array([0, 1, 0, 0, 1, 0], dtype=wp.uint8, device=device)
-    whole = WholeFrame((2, 3), pixels, radiance, reflector, None, None)
+    seen = wp.array([-1, 7, 0, -1, 2, -1], dtype=wp.int32, device=device)
+    whole = WholeFrame((2, 3), pixels, radiance, reflector, seen, CameraView(), None, None, no_bands)
     expected = np.zeros((2, 3, 3), np.float32)
     expected[1, 1], expected[0, 1] = (1, 2, 3), (4, 5, 6)
     np.testing.assert_array_equal(whole.reflection(), expected)
     assert whole.reflector_mask().tolist() == [[False, True, False], [False, True, False]] and whole.hits() is None
+    cutout = whole.cutout(np.full((2, 3, 3), 4.0, np.float32))
+    assert cutout[..., 3].tolist() == [[0.0, 1.0, 1.0], [0.0, 1.0, 0.0]] and cutout.dtype == np.float32
+    np.testing.assert_array_equal(cutout[..., 0], 4.0 * cutout[..., 3])
     whole.reflector_mask()[:] = True
     assert reflector.numpy().tolist() == [0, 1, 0, 0, 1, 0], "the mask is the caller's"
 
@@ -91,7 +117,12 @@ def banded(
     for parts in bands():
         mask[rows_of(parts.gbuffer)] = parts.gbuffer.reflector_mask
     assert not mask[0].any() and mask[20].any() and mask[-10].any()
-    return BandedFrame(mask, np.ones(mask.shape, np.uint16), bands)
+
+    def light(cutout: bool) -> Iterator[LightBand]:
+        for parts in bands():
+            yield LightBand(parts, *inner_rows(parts.gbuffer.band, camera, 0), light_of(parts, bounces, cutout=cutout))
+
+    return BandedFrame(mask, np.ones(mask.shape, np.uint16), bands, light)
 
 
 def test_bands_make_the_pictures_of_the_whole_image(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -121,6 +152,22 @@ def test_bands_make_the_later_hits_of_the_whole_image(monkeypatch: pytest.Monkey
             np.testing.assert_array_equal(found.ravel()[expected.pixels], known[:, k])
         known_distance = expected.later_distance[:, k]
         np.testing.assert_allclose(bounce.distance.ravel()[expected.pixels], known_distance, rtol=1e-5)
+
+
+def test_bands_make_the_cutout_of_the_whole_image(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen = draw_gbuffer(flat_mirror.on_device(flat_mirror.scene()), flat_mirror.CAMERA).objects
+    image = ldtrefl.render(flat_mirror.scene(), "bvh", max_bounces=1).image
+    made = banded(monkeypatch).cutout(image)
+    np.testing.assert_array_equal(made[..., 3], (seen >= 0).astype(np.float32))
+    np.testing.assert_allclose(made[..., :3], image * (seen >= 0)[..., None], atol=1e-6)
+
+
+@pytest.mark.parametrize(("first_row", "rows", "inside"), [(0, 18, (0, 16)), (14, 20, (16, 32)), (30, 22, (32, 52))])
+def test_rows_that_bands_are_right_for(first_row: int, rows: int, inside: tuple[int, int]) -> None:
+    """Of an image of 52 rows, in bands of 16 that go on for 2, if the image does."""
+    in_image, in_band = inner_rows(Band(first_row, rows), flat_mirror.CAMERA, 2)
+    assert (in_image.start, in_image.stop) == inside
+    assert (in_band.start + first_row, in_band.stop + first_row) == inside
 
 
 def test_bands_of_a_method_without_rays_have_no_hits(monkeypatch: pytest.MonkeyPatch) -> None:

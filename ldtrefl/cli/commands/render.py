@@ -30,10 +30,18 @@ from ldtrefl.cli.options import (
     scene_of,
     use_resources,
 )
+from ldtrefl.cli.picture_options import (
+    AsLayers,
+    Bits,
+    Exposure,
+    PictureOptions,
+    Quality,
+    ToneMapping,
+    Transparent,
+)
 from ldtrefl.cli.printing import say, stage_times
 from ldtrefl.cli.progress import progress_bar
 from ldtrefl.files.map_cache import MapCache, keep_maps_in
-from ldtrefl.files.picture_writing import check_writable, save_image
 from ldtrefl.frame.first_frame import foresee_a_frame
 from ldtrefl.methods import find_method
 from ldtrefl.renderer import Renderer
@@ -45,13 +53,19 @@ PLACE_IN_HELP = 10
 
 app = typer.Typer()
 
+Output = Annotated[
+    Path | None,
+    typer.Option("-o", "--output", help="PNG, JPEG, WebP or EXR; the file's name with .png if not given."),
+]
+SavedScene = Annotated[
+    Path | None, typer.Option("--save-scene", metavar="TOML", help="Write what a mesh is put on as a scene file.")
+]
+
 
 @app.command()
 def render(
     scene: SceneFile,
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="PNG or EXR; the file's name with .png if not given.")
-    ] = None,
+    output: Output = None,
     on: On = None,
     up: Up = None,
     turn: Turn = 0.0,
@@ -59,15 +73,18 @@ def render(
     size: Size = None,
     samples: Samples = None,
     lenient: Lenient = False,
-    scene_file: Annotated[
-        Path | None,
-        typer.Option("--save-scene", metavar="TOML", help="Write what a mesh is put on as a scene file."),
-    ] = None,
+    scene_file: SavedScene = None,
     method: Annotated[str | None, typer.Option(help="See `ldtrefl methods`; the scene's own if not given.")] = None,
     settings: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="OPTION=VALUE", help="An option of the method; may be repeated."),
     ] = None,
+    exposure: Exposure = None,
+    tone_mapping: ToneMapping = None,
+    bits: Bits = None,
+    quality: Quality = None,
+    transparent: Transparent = False,
+    layers: AsLayers = False,
     stats: Annotated[bool, typer.Option("--stats", help="Say what was done and what was skipped.")] = False,
     cache: CacheFolder = None,
     no_cache: Annotated[bool, typer.Option("--no-cache", help="Neither read nor keep maps on disk.")] = False,
@@ -78,7 +95,8 @@ def render(
     """Render a scene, or a mesh, to a picture."""
     use_resources(memory, threads)
     foresee_a_frame(device)
-    path = check_writable(output or Path(scene.stem + ".png"))
+    path = output or Path(scene.stem + (".exr" if layers else ".png"))
+    picture = PictureOptions(path, exposure, tone_mapping, bits, quality, transparent, layers)
     if cache is not None and no_cache:
         raise InputError("--cache and --no-cache exclude each other")
     if scene_file is not None:
@@ -86,7 +104,7 @@ def render(
         if is_scene_file(scene):
             raise InputError(f"--save-scene goes with a mesh file, {scene} is a scene file")
     with _maps_kept(cache, no_cache), budget.account():
-        loaded = scene_of(scene, on, up, turn, mirror, size, lenient)
+        loaded = picture.of_scene(scene_of(scene, on, up, turn, mirror, size, lenient))
         if scene_file is not None:
             save_scene(scene_file, loaded, include_of(scene, up_axis_of(scene, up), turn))
         options = parsed_settings(settings) | ({} if samples is None else {"samples": samples})
@@ -94,7 +112,7 @@ def render(
         find_method(loaded.reflection.method if method is None else method).configured(options)
         with progress_bar():
             frame = Renderer(loaded, method, device, **options).render()
-            save_image(path, frame.image)
+            picture.write(frame, loaded.picture)
     total = sum(frame.stats.seconds.values())
     say(f"{path}: {frame.image.shape[1]} x {frame.image.shape[0]} in {total:.2f} s", stage_times(frame))
     if up is None and not is_scene_file(scene):
