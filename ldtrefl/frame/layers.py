@@ -42,6 +42,11 @@ SMALLER = "camera.width or camera.height"
 """What an error names for the user to make smaller."""
 
 
+LEFT_OUT = np.float32(4.0)
+"""Radiance that stands for what a cutout leaves out where samples are chosen: what it will be put before is not known.
+Little is as bright, and what is darker or much brighter differs from it by the measure of ``contrast.py``."""
+
+
 def coverage(objects: np.ndarray) -> np.ndarray:
     """float32: 1 where the number of an object is seen, 0 where none is."""
     return (objects >= 0).astype(np.float32)
@@ -49,15 +54,16 @@ def coverage(objects: np.ndarray) -> np.ndarray:
 
 def light_of(parts: FrameParts, most: int, *, cutout: bool) -> Layers:
     """(pixels, 3) float32 of one G-buffer and the rays that leave it: ``beauty``, ``direct``, ``most`` reflections, and
-    ``alpha`` in three channels. ``beauty`` is always that of all that is seen: samples are chosen by it."""
+    ``alpha`` in three channels. Samples are chosen by ``beauty``, which of a cutout serves that alone."""
     through, covered = SeenThrough.of(parts), coverage(parts.gbuffer.objects)
     direct, mirrored = parts.shaded.radiance.numpy().reshape(*parts.gbuffer.shape, 3), reflections(parts)
+    beauty, alpha = composed(parts).numpy().reshape(*parts.gbuffer.shape, 3), (covered - through.share)[..., None]
     if cutout:
+        beauty = np.where(alpha > 0.5, beauty, LEFT_OUT)
         direct = direct * covered[..., None]
         for picture, is_behind in zip(mirrored, through.bounces, strict=False):
             picture[is_behind] = 0.0
-    alpha = np.repeat((covered - through.share)[..., None], 3, axis=2)
-    made = {"beauty": composed(parts).numpy(), "alpha": alpha, "direct": direct}
+    made = {"beauty": beauty, "alpha": np.repeat(alpha, 3, axis=2), "direct": direct}
     nothing = np.zeros((parts.gbuffer.pixel_count, 3), np.float32)
     made |= {f"{REFLECTION}{number}": nothing for number in range(1, most + 1)}
     made |= {f"{REFLECTION}{number}": picture for number, picture in enumerate(mirrored, 1)}
