@@ -111,6 +111,16 @@ def _loaded_scene(
     return mi.load_dict({"type": "scene", "camera": camera, "environment": environment, **named}, optimize=False)
 
 
+def sampling_camera(mi: Any, camera: Camera, deviation: float) -> Any:
+    """A camera that is sampled all over its pixels; its image is filtered by a Gaussian of this standard deviation in
+    pixels, which Mitsuba ends at four of them."""
+    described = _camera(mi, camera)
+    film = described["film"]
+    assert isinstance(film, dict)
+    film["rfilter"] = {"type": "gaussian", "stddev": deviation}
+    return mi.load_dict(described | {"sampler": {"type": "multijitter"}})
+
+
 def _camera(mi: Any, camera: Camera) -> dict[str, object]:
     """A camera whose only sample of a pixel lies in its middle."""
     distance = float(np.linalg.norm(np.subtract(camera.look_at, camera.eye)))
