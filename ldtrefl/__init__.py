@@ -47,6 +47,7 @@ if TYPE_CHECKING:
         Reflection,
         Scene,
     )
+    from ldtrefl.scene.lights import Occlusion
     from ldtrefl.scene.load import load_scene
     from ldtrefl.scene.mesh import Mesh
     from ldtrefl.scene.picture import Picture
@@ -67,6 +68,7 @@ __all__ = [
     "Material",
     "Mesh",
     "Object",
+    "Occlusion",
     "Picture",
     "Raycaster",
     "Reflection",
@@ -99,6 +101,7 @@ _HOMES = {
     "Material": "scene.description",
     "Mesh": "scene.mesh",
     "Object": "scene.description",
+    "Occlusion": "scene.lights",
     "Picture": "scene.picture",
     "Raycaster": "tracing.bvh",
     "Reflection": "scene.description",

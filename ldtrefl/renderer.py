@@ -297,7 +297,7 @@ class Renderer:
 
     def _shadow_tracer(self, gbuffer: GBuffer, stats: Stats) -> BoundTracer:
         """The tracer that answers the shadow rays of what the camera sees."""
-        if gbuffer.scene.lighting.shadows and not isinstance(gbuffer, SamplePoints):
+        if gbuffer.scene.scene.lighting.is_traced and not isinstance(gbuffer, SamplePoints):
             self._method.foresee(gbuffer, stats)
         return shadow_tracer(self._tracer, gbuffer.scene, stats)
 

@@ -17,7 +17,7 @@ import json
 import statistics
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -61,7 +61,7 @@ class MitsubaSampled:
         self._mi = mitsuba()
         importlib.import_module("drjit").set_thread_count(thread_count())
         self._scene = mitsuba_scene(scene, emitter=EMITTER)
-        self._sensor = sampling_camera(self._mi, scene.camera, DEVIATION)
+        self._sensor = sampling_camera(scene.camera, DEVIATION)
         self._place = self._mi.traverse(self._sensor)
         depth = scene.reflection.max_bounces + 1
         self._path: Any = self._mi.load_dict({"type": "path", "max_depth": depth, "rr_depth": NO_ROULETTE})
@@ -103,7 +103,7 @@ class Row:
         return self.error <= MOST_SHARE * self.their_error
 
 
-def seconds_of(make: Any, cameras: Iterator[Camera], rounds: int) -> float:
+def seconds_of(make: Callable[[Camera], object], cameras: Iterator[Camera], rounds: int) -> float:
     """Median seconds of a picture, each by another camera."""
     make(next(cameras))
     found = []

@@ -1,4 +1,4 @@
-"""The environment behind what the camera sees: the radiance of pixels in a row that see nothing else.
+"""The environment behind what the camera sees: the radiance of pixels in a row that see nothing else, but for lights.
 
 An environment of two colours is filled in for as many pixels at once as a vector has lanes, in C++ (``backdrop.h``).
 """
@@ -11,6 +11,7 @@ from ldtrefl.device.native_sources import native_body
 from ldtrefl.frame.gbuffer import GBufferView, ray_through
 from ldtrefl.geometry.vectors import as_single
 from ldtrefl.shading.environment import environment_radiance
+from ldtrefl.shading.light_shapes import seen_light
 from ldtrefl.world.camera import camera_ray
 from ldtrefl.world.records import LightingRecord
 
@@ -67,3 +68,14 @@ def fill_backdrop(
                 way = as_single(ray_through(gbuffer, i))
                 radiance_out[i] = environment_radiance(lighting, wp.normalize(way))
                 i += 1
+
+
+@wp.func
+def fill_lights(
+    gbuffer: GBufferView, lighting: LightingRecord, begin: int, end: int, radiance_out: wp.array(dtype=wp.vec3)
+):
+    """Fill in the lights whose shapes are seen by the pixels from ``begin`` to ``end``."""
+    for i in range(begin, end):
+        light = seen_light(lighting, gbuffer.camera.eye, wp.normalize(as_single(ray_through(gbuffer, i))), wp.inf)
+        if light >= 0:
+            radiance_out[i] = lighting.shaped[light].radiance

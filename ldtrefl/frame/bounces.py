@@ -20,7 +20,7 @@ from ldtrefl.base import budget
 from ldtrefl.device import launch
 from ldtrefl.device.bits import lowest_bit
 from ldtrefl.device.stats import Stats
-from ldtrefl.frame.gbuffer import GBuffer
+from ldtrefl.frame.gbuffer import GBuffer, GBufferView, pattern_place
 from ldtrefl.frame.ray_counts import counts_of
 from ldtrefl.frame.regions import Regions
 from ldtrefl.frame.shadows import shaded_by
@@ -28,6 +28,7 @@ from ldtrefl.frame.skip_options import SkipOptions
 from ldtrefl.frame.taken_rays import taken
 from ldtrefl.geometry.vectors import point_along
 from ldtrefl.shading.environment import environment_radiance
+from ldtrefl.shading.light_shapes import seen_light
 from ldtrefl.shading.surface import Surface, extended_coordinates, may_return, way_onwards
 from ldtrefl.shading.surfaces import GROUP, Sighting, look_along
 from ldtrefl.tracing.closest_hits import closest_hits_kernel
@@ -37,6 +38,7 @@ from ldtrefl.tracing.ray_buffers import HitBuffer, RayBuffer, RayEnds, empty_hit
 from ldtrefl.tracing.tracer import BoundTracer, Tracer, block_of
 from ldtrefl.world.look_records import Looks
 from ldtrefl.world.records import LightingRecord, ObjectRecord
+from ldtrefl.world.shading_features import ShadingFeatures
 from ldtrefl.world.top_level import TopLevel
 
 FARTHER = wp.constant(64.0)
@@ -118,10 +120,18 @@ def add_brought(radiance: wp.array(dtype=wp.vec3), numbers: wp.array(dtype=wp.in
     radiance[number] = radiance[number] + brought
 
 
+@wp.func
+def brought_by(lighting: LightingRecord, rays: RayBuffer, i: int, light: int) -> wp.vec3:
+    """What ray ``i``, which ends at no object, brings of the environment; or of a light, if the number is not -1."""
+    if light >= 0:
+        return wp.cw_mul(rays.throughput[i], lighting.shaped[light].radiance)
+    return wp.cw_mul(rays.throughput[i], environment_radiance(lighting, rays.direction[i]))
+
+
 @launch.once
-def shade_hits_kernel(tracer: Tracer, has_looks: bool, has_alpha: bool) -> wp.Kernel:
+def shade_hits_kernel(tracer: Tracer, features: ShadingFeatures) -> wp.Kernel:
     """The kernel that adds what rays met to what they bring, and sends them on from mirrors."""
-    shaded = shaded_by(tracer, has_looks, has_alpha)
+    shaded, with_visible_lights = shaded_by(tracer, features), wp.constant(features.visible_lights)
 
     @launch.kernel
     def shade_hits(
@@ -135,6 +145,7 @@ def shade_hits_kernel(tracer: Tracer, has_looks: bool, has_alpha: bool) -> wp.Ke
         lighting: LightingRecord,
         looks: Looks,
         views: wp.array(dtype=tracer.view),
+        gbuffer: GBufferView,
         numbers: wp.array(dtype=wp.int32),  # of the rays among the first bounce's; empty: they are those
         least_weight: float,
         # In and out:
@@ -152,22 +163,26 @@ def shade_hits_kernel(tracer: Tracer, has_looks: bool, has_alpha: bool) -> wp.Ke
             lanes = int(0)
             for i in range(begin, wp.min(begin + GROUP, end)):
                 onwards_out.source[i] = -1
-                if rays.source[i] >= 0 and hits.object[i] >= 0:
-                    sight_hit(objects, rays, hits, i, sightings, i - begin)
-                    lanes = lanes | (1 << (i - begin))
-                elif rays.source[i] >= 0:
-                    brought = environment_radiance(lighting, rays.direction[i])
-                    add_brought(radiance, numbers, i, wp.cw_mul(rays.throughput[i], brought))
+                if rays.source[i] >= 0:
+                    light = int(-1)
+                    if with_visible_lights:
+                        light = seen_light(lighting, rays.origin[i], rays.direction[i], hits.t[i])
+                    if hits.object[i] >= 0 and light < 0:
+                        sight_hit(objects, rays, hits, i, sightings, i - begin)
+                        lanes = lanes | (1 << (i - begin))
+                    else:
+                        add_brought(radiance, numbers, i, brought_by(lighting, rays, i, light))
             look_along(objects, lanes, sightings, surfaces)
             while lanes != 0:
                 lane = lowest_bit(wp.uint64(lanes))
                 lanes = lanes & (lanes - 1)
                 i = begin + lane
                 surfaces[lane].position = placed_on_ray(objects, rays, hits, i, surfaces[lane].position)
-                light = shaded(views, objects, top, lighting, looks, sightings, lane, surfaces)
+                place = pattern_place(gbuffer, rays.pixel[i])
+                leaving = shaded(views, objects, top, lighting, looks, sightings, lane, surfaces, place)
                 if wp.max(surfaces[lane].mirror) > 0.0:
-                    light += go_on(objects, lighting, rays, i, surfaces[lane], least_weight, onwards_out)
-                add_brought(radiance, numbers, i, wp.cw_mul(rays.throughput[i], light))
+                    leaving += go_on(objects, lighting, rays, i, surfaces[lane], least_weight, onwards_out)
+                add_brought(radiance, numbers, i, wp.cw_mul(rays.throughput[i], leaving))
             begin += GROUP
 
     return shade_hits
@@ -332,19 +347,23 @@ class RayFollower:
             launch.launch(kernel, -(-count // block), inputs, device)
             self._count(rays, hits)
         with self.stats.stage("shade", device):
-            shadow, onwards = tracer if scene.lighting.shadows else no_shadows(device), empty_rays(count, device)
+            shadow, onwards = (
+                tracer if scene.scene.lighting.is_traced else no_shadows(device),
+                empty_rays(count, device),
+            )
             places = wp.array(np.empty(0, np.int32) if numbers is None else numbers, dtype=wp.int32, device=device)
             weight = np.inf if is_last else self.limits.least_weight
             block = block_of(device)
             inputs = [block, rays, hits, scene.records, scene.top_level, scene.lighting, scene.looks, shadow.views]
-            kernel = shade_hits_kernel(shadow.tracer, scene.has_looks, scene.has_dimmed_shadows)
-            launch.launch(kernel, -(-count // block), [*inputs, places, weight, radiance, onwards], device)
+            inputs += [self.gbuffer.view, places, weight, radiance, onwards]
+            kernel = shade_hits_kernel(shadow.tracer, scene.features)
+            launch.launch(kernel, -(-count // block), inputs, device)
         return hits, onwards
 
     def _needed(self, regions: Regions) -> set[int]:
         """The objects that the tracer must be ready for."""
         scene = self.gbuffer.scene
-        if self.skip.maps and not scene.lighting.shadows:
+        if self.skip.maps and not scene.scene.lighting.is_traced:
             return regions.shown
         return {entry.index for entry in scene.objects}
 

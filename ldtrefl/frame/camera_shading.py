@@ -6,26 +6,43 @@ import warp as wp
 
 from ldtrefl.device import launch
 from ldtrefl.device.bits import lowest_bit
-from ldtrefl.frame.backdrop import fill_backdrop
-from ldtrefl.frame.gbuffer import GBuffer, GBufferView, sight
+from ldtrefl.frame.backdrop import fill_backdrop, fill_lights
+from ldtrefl.frame.gbuffer import GBuffer, GBufferView, pattern_place, sight
 from ldtrefl.frame.shadows import shaded_by
+from ldtrefl.geometry.vectors import from_to
+from ldtrefl.shading.light_shapes import seen_light
 from ldtrefl.shading.surface import Surface, may_return, way_onwards
 from ldtrefl.shading.surfaces import GROUP, Sighting, look_from
 from ldtrefl.tracing.nothing import no_shadows
 from ldtrefl.tracing.ray_buffers import RayBuffer, empty_rays
 from ldtrefl.tracing.tracer import BoundTracer, Tracer, block_of
+from ldtrefl.world.camera import CameraView
 from ldtrefl.world.look_records import Looks
 from ldtrefl.world.records import LightingRecord, ObjectRecord
+from ldtrefl.world.shading_features import ShadingFeatures
 from ldtrefl.world.top_level import TopLevel
 
 PIXELS_IN_A_ROW = 256
 """Pixels that one thread of a CPU shades in a row: what sees nothing is filled in together."""
 
 
+@wp.func
+def light_before(
+    camera: CameraView,
+    lighting: LightingRecord,
+    sightings: wp.array(dtype=Sighting),
+    lane: int,
+    surfaces: wp.array(dtype=Surface),
+) -> int:
+    """The number of the light that hides a lane's surface from the camera; -1 if none does."""
+    distance = wp.length(from_to(camera.eye, surfaces[lane].position))
+    return seen_light(lighting, camera.eye, sightings[lane].view, distance)
+
+
 @launch.once
-def shade_pixels_kernel(tracer: Tracer, has_looks: bool, has_alpha: bool) -> wp.Kernel:
+def shade_pixels_kernel(tracer: Tracer, features: ShadingFeatures) -> wp.Kernel:
     """The kernel that shades what the camera sees, reflectors left out."""
-    shaded = shaded_by(tracer, has_looks, has_alpha)
+    shaded, with_visible_lights = shaded_by(tracer, features), wp.constant(features.visible_lights)
 
     @launch.kernel
     def shade_pixels(
@@ -52,6 +69,8 @@ def shade_pixels_kernel(tracer: Tracer, has_looks: bool, has_alpha: bool) -> wp.
             while i < end and gbuffer.object[i] < 0:
                 i += 1
             fill_backdrop(gbuffer, lighting, begin, i, radiance_out)
+            if with_visible_lights:
+                fill_lights(gbuffer, lighting, begin, i, radiance_out)
             begin = int(i)
             lanes = int(0)
             while i < wp.min(end, begin + GROUP) and gbuffer.object[i] >= 0:
@@ -63,8 +82,15 @@ def shade_pixels_kernel(tracer: Tracer, has_looks: bool, has_alpha: bool) -> wp.
             while lanes != 0:
                 lane = lowest_bit(wp.uint64(lanes))
                 lanes = lanes & (lanes - 1)
-                light = shaded(views, objects, top, lighting, looks, sightings, lane, surfaces)
-                radiance_out[begin + lane] = light
+                light = int(-1)
+                if with_visible_lights:
+                    light = light_before(gbuffer.camera, lighting, sightings, lane, surfaces)
+                if light >= 0:
+                    radiance_out[begin + lane] = lighting.shaped[light].radiance
+                else:
+                    place = pattern_place(gbuffer, begin + lane)
+                    leaving = shaded(views, objects, top, lighting, looks, sightings, lane, surfaces, place)
+                    radiance_out[begin + lane] = leaving
 
     return shade_pixels
 
@@ -82,10 +108,11 @@ def start_ray(rays: RayBuffer, i: int, objects: wp.array(dtype=ObjectRecord), su
 
 
 @launch.once
-def shade_reflectors_kernel(tracer: Tracer, starts_rays: bool, has_looks: bool, has_alpha: bool) -> wp.Kernel:
+def shade_reflectors_kernel(tracer: Tracer, starts_rays: bool, features: ShadingFeatures) -> wp.Kernel:
     """The kernel that shades the pixels that see a reflector, without what it reflects, and starts their rays if
     ``starts_rays``."""
-    shaded, with_rays = shaded_by(tracer, has_looks, has_alpha), wp.constant(starts_rays)
+    shaded, with_rays = shaded_by(tracer, features), wp.constant(starts_rays)
+    with_visible_lights = wp.constant(features.visible_lights)
 
     @launch.kernel
     def shade_reflectors(
@@ -117,7 +144,13 @@ def shade_reflectors_kernel(tracer: Tracer, starts_rays: bool, has_looks: bool, 
             look_from(objects, (1 << count) - 1, gbuffer.camera.eye, sightings, surfaces)
             for lane in range(count):
                 pixel = pixels[begin + lane]
-                radiance_out[pixel] = shaded(views, objects, top, lighting, looks, sightings, lane, surfaces)
+                place = pattern_place(gbuffer, pixel)
+                radiance_out[pixel] = shaded(views, objects, top, lighting, looks, sightings, lane, surfaces, place)
+                if with_visible_lights:
+                    light = light_before(gbuffer.camera, lighting, sightings, lane, surfaces)
+                    if light >= 0:  # it hides the mirror
+                        radiance_out[pixel] = lighting.shaped[light].radiance
+                        surfaces[lane].mirror = wp.vec3(0.0)
                 mirror_out[begin + lane] = surfaces[lane].mirror
                 if with_rays:
                     rays.pixel[begin + lane] = pixel
@@ -148,7 +181,7 @@ def shade_gbuffer(
         radiance = wp.empty(gbuffer.pixel_count, dtype=wp.vec3, device=device)
     block = PIXELS_IN_A_ROW if device.is_cpu else 1
     inputs = [block, gbuffer.view, scene.records, scene.top_level, scene.lighting, scene.looks, shadow.views, radiance]
-    kernel = shade_pixels_kernel(shadow.tracer, scene.has_looks, scene.has_dimmed_shadows)
+    kernel = shade_pixels_kernel(shadow.tracer, scene.features)
     launch.launch(kernel, -(-gbuffer.pixel_count // block), inputs, device)
     return _with_reflectors(gbuffer, shadow, radiance, starts_rays=starts_rays)
 
@@ -166,7 +199,7 @@ def _with_reflectors(gbuffer: GBuffer, shadow: BoundTracer, radiance: wp.array, 
     count = pixels.shape[0]
     mirror, rays = wp.empty(count, dtype=wp.vec3, device=device), empty_rays(count if starts_rays else 0, device)
     block = block_of(device)
-    kernel = shade_reflectors_kernel(shadow.tracer, starts_rays, scene.has_looks, scene.has_dimmed_shadows)
+    kernel = shade_reflectors_kernel(shadow.tracer, starts_rays, scene.features)
     inputs = [block, pixels, gbuffer.view, scene.records, scene.top_level, scene.lighting, scene.looks, shadow.views]
     launch.launch(kernel, -(-count // block), [*inputs, rays, radiance, mirror], device)
     return Shaded(radiance, mirror, rays)

@@ -50,11 +50,11 @@ def foresee_a_frame(device: str | None) -> None:
 
 def kernels_of_rays(scene: DeviceScene, tracer: Tracer, skip: SkipOptions) -> list[wp.Kernel]:
     """What follows the rays of a scene by a tracer, and shades what they and the camera see."""
-    shadow = tracer if scene.lighting.shadows else NOTHING
+    shadow = tracer if scene.scene.lighting.is_traced else NOTHING
     return [
         closest_hits_kernel(tracer, block_of(scene.device), skip.bounds),
-        shade_hits_kernel(shadow, scene.has_looks, scene.has_dimmed_shadows),
-        shade_pixels_kernel(shadow, scene.has_looks, scene.has_dimmed_shadows),
-        shade_reflectors_kernel(shadow, True, scene.has_looks, scene.has_dimmed_shadows),
+        shade_hits_kernel(shadow, scene.features),
+        shade_pixels_kernel(shadow, scene.features),
+        shade_reflectors_kernel(shadow, True, scene.features),
         count_rays,
     ]

@@ -15,9 +15,15 @@ from ldtrefl.scene.description import Camera
 from ldtrefl.shading.surface import Surface
 from ldtrefl.shading.surfaces import GROUP, Sighting, look_from
 from ldtrefl.tracing.tracer import block_of
-from ldtrefl.world.camera import Band, CameraView, camera_ray
+from ldtrefl.world.camera import Band, CameraView, camera_ray, pixel_place
 from ldtrefl.world.device_scene import DeviceScene
 from ldtrefl.world.records import ObjectRecord
+
+PLACES = wp.constant(wp.float64(64.0))
+"""Of a pixel along each axis, that points are told apart by."""
+
+STRIDE = wp.constant(wp.vec2i(17, 29))
+"""Pixels between the patterns of points that are a place apart."""
 
 
 @wp.struct
@@ -45,6 +51,20 @@ def ray_through(gbuffer: GBufferView, i: int) -> wp.vec3d:
     if gbuffer.place.shape[0] == 0:
         return pixel_ray(gbuffer.camera, i)
     return camera_ray(gbuffer.camera, gbuffer.place[i][0], gbuffer.place[i][1])
+
+
+@wp.func
+def pattern_place(gbuffer: GBufferView, i: int) -> wp.vec2i:
+    """Where what pixel or point ``i`` sees takes its patterns of samples from: the pixel in the whole image, and for
+    points of a pixel places far from one another, so that their grain is not the same."""
+    if gbuffer.place.shape[0] == 0:
+        return pixel_place(gbuffer.camera, i)
+    at = gbuffer.place[i]
+    column, row = wp.floor(at[0]), wp.floor(at[1]) + wp.float64(gbuffer.camera.first_row)
+    within = wp.vec2d(at[0] - wp.floor(at[0]), at[1] - wp.floor(at[1]))
+    # To multiples of 1/64 of a pixel: rows of a band may be told by other numbers, which round in other ways.
+    right, down = wp.rint(PLACES * within[0]), wp.rint(PLACES * within[1])
+    return wp.vec2i(int(column) + STRIDE[0] * int(right), int(row) + STRIDE[1] * int(down))
 
 
 @wp.func

@@ -93,9 +93,9 @@ def followed_with_history(
     follower: RayFollower, rays: RayBuffer, regions: Regions, reusable: Reusable | None
 ) -> FollowedRays:
     """Where rays end, taken from the last frame but for rays that may end elsewhere; all are followed if none of it
-    can be used, as with shadows, which what has moved may cast anywhere."""
+    can be used, as with shadows and occlusion, which what has moved may cast anywhere."""
     before, scene = None if reusable is None else reusable.reflected.followed, follower.gbuffer.scene
-    if reusable is None or before is None or scene.lighting.shadows:
+    if reusable is None or before is None or scene.scene.lighting.is_traced:
         return follower.follow(rays, regions)
     with follower.stats.stage("cull", scene.device):
         runs = changed_runs(before, rays, regions, reusable.moved, len(scene.objects))

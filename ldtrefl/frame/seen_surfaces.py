@@ -37,7 +37,7 @@ class SeenSurfaces:
         normal, albedo = (wp.zeros(count, dtype=wp.vec3, device=scene.device) for _ in range(2))
         block = block_of(scene.device)
         inputs = [block, gbuffer.view, scene.records, scene.lighting, scene.looks, depth, normal, albedo]
-        launch.launch(describe_kernel(scene.has_looks), -(-count // block), inputs, scene.device)
+        launch.launch(describe_kernel(scene.features.looks), -(-count // block), inputs, scene.device)
         height, width = gbuffer.shape
         in_world = depth.numpy().reshape(height, width) / np.float32(scene.device_units_per_world_unit)
         colors = (values.numpy().reshape(height, width, 3) for values in (normal, albedo))

@@ -18,6 +18,7 @@ from ldtrefl.tracing.nothing import NOTHING
 from ldtrefl.tracing.tracer import Query, Tracer
 from ldtrefl.world.look_records import Looks
 from ldtrefl.world.records import ObjectRecord
+from ldtrefl.world.shading_features import ShadingFeatures
 from ldtrefl.world.top_level import STACK, TopLevel
 from ldtrefl.world.unit_rays import facet_towards, into_unit, start_above, start_above_own, unit_normal
 
@@ -126,9 +127,9 @@ def passing(tracer: Tracer, has_alpha: bool) -> Callable[..., float]:
 
 
 @launch.once
-def shaded_by(tracer: Tracer, has_looks: bool, has_alpha: bool) -> Callable[..., wp.vec3]:
-    """``shaded`` with this tracer's shadows. ``has_alpha`` says whether any object lets light through by its alpha."""
-    passed = passing(tracer, has_alpha)
+def shaded_by(tracer: Tracer, features: ShadingFeatures) -> Callable[..., wp.vec3]:
+    """``shaded`` with this tracer's shadows and occlusion, for scenes that have these features."""
+    passed = passing(tracer, features.dimmed_shadows)
 
     @wp.func
     def share_lit(
@@ -174,4 +175,6 @@ def shaded_by(tracer: Tracer, has_looks: bool, has_alpha: bool) -> Callable[...,
     ) -> float:
         return 1.0
 
-    return make_shaded(always_lit if tracer is NOTHING else share_lit, has_looks)
+    if tracer is NOTHING:
+        return make_shaded(always_lit, features.without_rays())
+    return make_shaded(share_lit, features)

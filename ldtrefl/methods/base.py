@@ -142,7 +142,7 @@ class Method(abc.ABC):
 
     def foresee(self, gbuffer: GBuffer, stats: Stats) -> None:  # noqa: B027  (most methods have nothing to foresee)
         """Make the tracer ready for what the camera sees. Called before shadow rays are asked of it, only if the scene
-        has shadows."""
+        has shadows or occlusion."""
 
     @classmethod
     def describe(cls) -> str:

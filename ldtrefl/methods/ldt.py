@@ -176,7 +176,7 @@ class Ldt(RayMethod):
         if isinstance(gbuffer, SamplePoints):
             return regions  # the maps are those of the pixels that they lie about
         if bounce == 0:
-            if not self.scene.lighting.shadows:  # which have chosen already (``foresee``)
+            if not self.scene.scene.lighting.is_traced:  # shadows have chosen already (``foresee``)
                 self.tracer.chosen = self._resolutions(gbuffer, rays, regions)
             return regions
         # A mesh that is seen in reflections of reflections, too, gets the finest maps that the frame has asked for.
@@ -217,7 +217,7 @@ class Ldt(RayMethod):
         """The resolutions that the rays of a bounce and the shadows need; empty if all maps have the usual one."""
         if self.config.error is None or not self._chooses:
             return {}
-        footprints = finest_footprints(gbuffer, rays, regions, is_seen=bool(self.scene.lighting.shadows))
+        footprints = finest_footprints(gbuffer, rays, regions, is_seen=self.scene.scene.lighting.is_traced)
         return resolutions_for(self.config.error, self.config.search, self.scene, footprints)
 
     def _culled(self, gbuffer: GBuffer, rays: RayBuffer, bounce: int, stats: Stats) -> Regions:

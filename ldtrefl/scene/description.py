@@ -10,7 +10,7 @@ import dataclasses
 import fnmatch
 import functools
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,11 +20,9 @@ from pydantic.dataclasses import dataclass
 from ldtrefl.base.checked import (
     CONFIG,
     SMALLEST,
-    Color,
     Direction,
     Flag,
     Fraction,
-    Intensity,
     Number,
     Positive,
     Real,
@@ -42,6 +40,7 @@ from ldtrefl.files.stored_picture import StoredPicture
 from ldtrefl.scene import shapes
 from ldtrefl.scene.environment import Environment
 from ldtrefl.scene.layout import Layout
+from ldtrefl.scene.lights import Light, Lighting
 from ldtrefl.scene.material import Material
 from ldtrefl.scene.mesh import Mesh
 from ldtrefl.scene.picture import Picture
@@ -86,41 +85,6 @@ class Camera:
         up = np.asarray(self.up) / np.linalg.norm(self.up)
         if np.linalg.norm(np.cross(forward / np.linalg.norm(forward), up)) < PARALLEL:
             raise ValueError("up is parallel to the line from eye to look_at")
-        return self
-
-
-@refusing_in_one_line
-@dataclass(frozen=True, kw_only=True, config=CONFIG)
-class Lighting:
-    """What all lights share."""
-
-    ambient: Color | None = None
-    """Added irradiance / pi. If not given, it is that of the environment's preset, or else ``AMBIENT``."""
-    shadows: Flag = False
-
-
-@refusing_in_one_line
-@dataclass(frozen=True, kw_only=True, config=CONFIG)
-class Light:
-    """A directional or a point light."""
-
-    kind: Literal["directional", "point"]
-    direction: Direction | None = None
-    """Directional: the way the light travels."""
-    radiance: Color | None = None
-    """Directional: radiance leaving a white diffuse surface that faces the light."""
-    position: Vector | None = None
-    intensity: Intensity | None = None
-    """Point: ``intensity / distance^2`` in place of ``radiance``."""
-
-    @model_validator(mode="after")
-    def _has_what_its_kind_needs(self) -> Light:
-        own = {"directional": ("direction", "radiance"), "point": ("position", "intensity")}
-        for kind, keys in own.items():
-            for key in keys:
-                if (getattr(self, key) is None) == (kind == self.kind):
-                    fault = "needs" if kind == self.kind else "has no"
-                    raise ValueError(f"a {self.kind} light {fault} '{key}' (it has {' and '.join(own[self.kind])})")
         return self
 
 

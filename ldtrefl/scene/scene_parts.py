@@ -41,13 +41,20 @@ def _object_moved(entry: Object, matrix: np.ndarray) -> Object:
 
 
 def _light_moved(light: Light, matrix: np.ndarray) -> Light:
-    if light.direction is not None:
-        return dataclasses.replace(light, direction=tuple(matrix[:3, :3] @ np.asarray(light.direction)))
-    position = matrix @ [*np.asarray(light.position), 1.0]
-    # A scene that is made twice as large is lit the same by a light four times as strong.
+    changes: dict[str, Any] = {}
+    for key in ("direction", "up"):
+        if (direction := getattr(light, key)) is not None:
+            changes[key] = tuple(matrix[:3, :3] @ np.asarray(direction))
+    if light.position is not None:
+        changes["position"] = tuple((matrix @ [*light.position, 1.0])[:3])
     size = float(np.cbrt(abs(np.linalg.det(matrix[:3, :3]))))
-    intensity = tuple(size * size * channel for channel in np.asarray(light.intensity))
-    return dataclasses.replace(light, position=tuple(position[:3]), intensity=intensity)
+    for key in ("radius", "width", "height"):
+        if (length := getattr(light, key)) is not None:
+            changes[key] = size * length
+    if light.intensity is not None:
+        # A scene that is made twice as large is lit the same by a light four times as strong.
+        changes["intensity"] = tuple(size * size * channel for channel in light.intensity)
+    return dataclasses.replace(light, **changes)
 
 
 def _camera_moved(camera: Camera, matrix: np.ndarray) -> Camera:

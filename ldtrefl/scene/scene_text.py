@@ -25,8 +25,9 @@ COMMENTS = {
     "environment.sky": "straight up, blended with the ground by height",
     "environment.preset": "it brings light along",
     "lighting.ambient": "from all sides, as if it were the radiance of a white surface",
+    "lighting.occlusion": "dims ambient light beside what stands close",
     "light.direction": "the way the light travels",
-    "light.radiance": "leaving a white surface that faces it",
+    "light.radiance": "leaving a white surface that faces it; of a sphere or rectangle, its own",
     "include": "all nodes of a glTF file",
     "include.lights": "whether its lights come, too",
     "object.mesh": "looked for beside this file, then in LDTREFL_MESH_PATH",
@@ -91,6 +92,9 @@ def scene_text(scene: Scene, path: Path, include: Include | None = None) -> str:
     lines.table("camera", "[camera]", _written(scene.camera, always=True))
     lines.table("environment", "[environment]", _environment(scene.environment))
     lines.table("lighting", "[lighting]", _written(scene.lighting, always=True))
+    if scene.lighting.occlusion is not None:
+        occlusion = _written(scene.lighting.occlusion, always=True)
+        lines.table("lighting.occlusion", "[lighting.occlusion]", occlusion, is_part=True)
     for light in scene.lights:
         lines.table("light", "[[light]]", _written(light))
     if include is not None and any(isinstance(entry.mesh, Mesh) for entry in scene.objects):

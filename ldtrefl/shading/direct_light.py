@@ -15,34 +15,26 @@ import warp as wp
 from ldtrefl.geometry.vectors import from_to
 from ldtrefl.shading.finish import Finish, finish_surface
 from ldtrefl.shading.highlights import highlights
+from ldtrefl.shading.radiance_limit import SMALLEST_SQUARE, at_most_largest
+from ldtrefl.shading.soft_light import make_soft_light
 from ldtrefl.shading.surface import Surface
 from ldtrefl.shading.surfaces import Sighting, color_surface
 from ldtrefl.world.look_records import Looks
 from ldtrefl.world.records import LightingRecord, ObjectRecord
+from ldtrefl.world.shading_features import ShadingFeatures
 from ldtrefl.world.top_level import TopLevel
 
-SMALLEST_SQUARE = wp.constant(1.0e-36)
-"""The least squared distance that a point light's intensity is divided by: in the surface itself that would be 0."""
 
-LARGEST_RADIANCE = wp.constant(1.0e30)
-"""Brighter radiance is cut to this: its sums and products stay finite, and no pixel becomes infinity times 0."""
-
-
-@wp.func
-def at_most_largest(radiance: wp.vec3) -> wp.vec3:
-    """Radiance, cut to ``LARGEST_RADIANCE``."""
-    return wp.min(radiance, wp.vec3(LARGEST_RADIANCE))
-
-
-def make_direct_radiance(share_lit: Callable[..., float], has_looks: bool) -> Callable[..., wp.vec3]:
-    """``direct_radiance(views, objects, top, lighting, looks, surface, finishes)``: emitted and scattered radiance; the
-    first of ``finishes`` counts only if ``has_looks``.
+def make_direct_radiance(share_lit: Callable[..., float], features: ShadingFeatures) -> Callable[..., wp.vec3]:
+    """``direct_radiance(views, objects, top, lighting, looks, surface, finishes, pixel)``: emitted and scattered
+    radiance; the first of ``finishes`` counts only if there are looks.
 
     ``share_lit(views, objects, top, looks, surface, direction, distance)`` answers how much light arrives from unit
     ``direction``, from a light at ``distance``, from 0 to 1; only what looks let through is between. It closes over a
     tracer, so shadows exist once for all tracers.
     """
-    with_looks = wp.constant(has_looks)
+    with_looks, with_shadows = wp.constant(features.looks), wp.constant(features.shadows)
+    with_soft, soft_light = wp.constant(features.soft_light), make_soft_light(share_lit, features)
 
     @wp.func
     def direct_radiance(
@@ -53,11 +45,18 @@ def make_direct_radiance(share_lit: Callable[..., float], has_looks: bool) -> Ca
         looks: Looks,
         surface: Surface,
         finishes: wp.array(dtype=Finish),
+        pixel: wp.vec2i,
     ) -> wp.vec3:
         total = lighting.ambient
         shine = wp.vec3(0.0)
+        normal = surface.normal
         if with_looks:
+            normal = finishes[0].normal
             total = finishes[0].ambient * lighting.ambient
+        if with_soft:
+            lit = soft_light(views, objects, top, lighting, looks, surface, normal, finishes, pixel)
+            total = lit.ambient * total + lit.scattered
+            shine = lit.mirrored
         for i in range(lighting.lights.shape[0]):
             towards = lighting.lights[i].towards
             radiance = lighting.lights[i].radiance
@@ -67,11 +66,11 @@ def make_direct_radiance(share_lit: Callable[..., float], has_looks: bool) -> Ca
                 distance = wp.length(offset)
                 towards = wp.normalize(offset)
                 radiance = at_most_largest(radiance / wp.max(distance * distance, SMALLEST_SQUARE))
-            cosine = wp.dot(surface.normal, towards)
-            if with_looks:
-                cosine = wp.dot(finishes[0].normal, towards)
+            cosine = wp.dot(normal, towards)
             if cosine > 0.0:
-                share = share_lit(views, objects, top, looks, surface, towards, distance)
+                share = float(1.0)
+                if with_shadows:
+                    share = share_lit(views, objects, top, looks, surface, towards, distance)
                 if share > 0.0:
                     if with_looks:
                         radiance = share * radiance
@@ -86,13 +85,13 @@ def make_direct_radiance(share_lit: Callable[..., float], has_looks: bool) -> Ca
     return direct_radiance
 
 
-def make_shaded(share_lit: Callable[..., float], has_looks: bool) -> Callable[..., wp.vec3]:
-    """``shaded(views, objects, top, lighting, looks, sightings, lane, surfaces)``: what ``direct_radiance`` gives for
-    a lane's surface, of which what its object's colours, or its look, say is set first.
+def make_shaded(share_lit: Callable[..., float], features: ShadingFeatures) -> Callable[..., wp.vec3]:
+    """``shaded(views, objects, top, lighting, looks, sightings, lane, surfaces, pixel)``: what ``direct_radiance``
+    gives for a lane's surface, of which what its object's colours, or its look, say is set first.
 
-    ``has_looks`` says whether any object of the scene has a look.
+    ``pixel`` is the column and the row in the image whose samples of lights are taken.
     """
-    direct_radiance = make_direct_radiance(share_lit, has_looks)
+    direct_radiance = make_direct_radiance(share_lit, features)
 
     @wp.func
     def shaded_without_looks(
@@ -104,10 +103,11 @@ def make_shaded(share_lit: Callable[..., float], has_looks: bool) -> Callable[..
         sightings: wp.array(dtype=Sighting),
         lane: int,
         surfaces: wp.array(dtype=Surface),
+        pixel: wp.vec2i,
     ) -> wp.vec3:
         color_surface(objects, sightings, lane, surfaces)
         no_finishes = wp.array(ptr=wp.uint64(0), shape=(0,), dtype=Finish)
-        return direct_radiance(views, objects, top, lighting, looks, surfaces[lane], no_finishes)
+        return direct_radiance(views, objects, top, lighting, looks, surfaces[lane], no_finishes, pixel)
 
     @wp.func
     def shaded_with_looks(
@@ -119,6 +119,7 @@ def make_shaded(share_lit: Callable[..., float], has_looks: bool) -> Callable[..
         sightings: wp.array(dtype=Sighting),
         lane: int,
         surfaces: wp.array(dtype=Surface),
+        pixel: wp.vec2i,
     ) -> wp.vec3:
         memory = wp.zeros(shape=1, dtype=Finish)
         finishes = wp.array(ptr=memory.ptr, shape=(1,), dtype=Finish)
@@ -128,6 +129,6 @@ def make_shaded(share_lit: Callable[..., float], has_looks: bool) -> Callable[..
             color_surface(objects, sightings, lane, surfaces)
             finishes[0].ambient = 1.0
             finishes[0].normal = surfaces[lane].normal
-        return direct_radiance(views, objects, top, lighting, looks, surfaces[lane], finishes)
+        return direct_radiance(views, objects, top, lighting, looks, surfaces[lane], finishes, pixel)
 
-    return shaded_with_looks if has_looks else shaded_without_looks
+    return shaded_with_looks if features.looks else shaded_without_looks

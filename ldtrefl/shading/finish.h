@@ -203,6 +203,7 @@ struct Finishes {
         Three haze, coat_haze;   // what is reflected of the environment in place of rays
         float cosine, coat_cosine;  // by which these blur
         int is_by_coat;          // 1 if rays are mirrored at the varnish
+        int rays;                // which layers they are sent for: 1 the base, 2 the varnish, or both
         Three behind;            // what is seen of the environment behind it in place of rays
         int goes_through;        // 1 if rays go straight on
     };
@@ -270,6 +271,7 @@ struct Finishes {
         made.haze = sends ? grey(0.0f) : base;
         made.coat_haze = grey(coat_sends ? 0.0f : coat);
         made.is_by_coat = coat_sends && (!sends || coat > most);
+        made.rays = (int)sends | (int)coat_sends << 1;
         made.behind = grey(0.0f);
         made.goes_through = 0;
     }
@@ -286,6 +288,7 @@ struct Finishes {
         if (of.goes_through) {
             (of.is_by_coat ? of.coat_haze : of.haze) = sum(of.is_by_coat ? of.coat_haze : of.haze, of.mirror);
             of.mirror = grey(through);
+            of.rays = 0;
         } else {
             of.behind = grey(through);
         }

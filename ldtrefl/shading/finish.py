@@ -49,6 +49,7 @@ class Finish:
 
     ambient: float  # share of the ambient light that arrives
     highlights: int  # layers that mirror lights: 0, the base, or both
+    rays: int  # layers that send rays: 1 the base, 2 the varnish, or both
     normal: wp.vec3  # shading normal of the base
     coat_normal: wp.vec3  # and of the varnish, which normal maps do not bend
     view: wp.vec3  # unit, from the eye
@@ -256,6 +257,7 @@ finish.low = material.has_highlights ? vec3(layers.low) : wp::vec3(0.0f);
 finish.high = material.has_highlights ? vec3(layers.high) : wp::vec3(0.0f);
 finish.coat_low = vec3(layers.coat_low);
 finish.coat_high = vec3(layers.coat_high);
+finish.rays = layers.rays;
 finish.highlights = model.clearcoat > 0.0f ? 2 : material.has_highlights && Finishes::largest(layers.high) > 0.0f;
 const float rough = Finishes::larger(model.roughness, LEAST_ROUGHNESS);
 const float coat_rough = Finishes::larger(model.coat_roughness, LEAST_ROUGHNESS);

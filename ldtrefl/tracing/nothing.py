@@ -1,4 +1,4 @@
-"""A tracer that meets nothing, for scenes without shadows: kernels that are built from it hold no shadow rays."""
+"""A tracer that meets nothing, for scenes without shadows and occlusion: kernels built from it hold no such rays."""
 
 from __future__ import annotations
 
@@ -41,7 +41,8 @@ def no_shadows(device: wp.Device) -> BoundTracer:
 
 
 def shadow_tracer(tracer: SceneTracer, scene: DeviceScene, stats: Stats) -> BoundTracer:
-    """The tracer that answers a scene's shadow rays: ``tracer``, or one that meets nothing if there are no shadows."""
-    if not scene.lighting.shadows:
+    """The tracer that answers a scene's shadow rays, and those for occlusion: ``tracer``, or one that meets nothing if
+    there are none."""
+    if not scene.scene.lighting.is_traced:
         return no_shadows(scene.device)
     return tracer.bound(scene, range(len(scene.objects)), stats)

@@ -53,6 +53,13 @@ def camera_ray(camera: CameraView, x: wp.float64, y: wp.float64) -> wp.vec3d:
     return camera.forward + across * camera.right + along * camera.down
 
 
+@wp.func
+def pixel_place(camera: CameraView, pixel: int) -> wp.vec2i:
+    """Column and row in the whole image of a pixel of the band."""
+    row = pixel / camera.width
+    return wp.vec2i(pixel - row * camera.width, row + camera.first_row)
+
+
 @functools.lru_cache(maxsize=1)
 def camera_axes(camera: Camera) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Unit ``right``, ``down`` and ``forward`` in the world, float64."""

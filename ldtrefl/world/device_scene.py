@@ -29,6 +29,8 @@ from ldtrefl.world.look_records import Looks
 from ldtrefl.world.object_records import fill_places, fill_records
 from ldtrefl.world.records import LightingRecord, ObjectRecord
 from ldtrefl.world.scene_looks import SceneLooks
+from ldtrefl.world.shading_features import ShadingFeatures
+from ldtrefl.world.shaped_lights import SHAPED
 from ldtrefl.world.top_level import TopLevel, order_of, top_level
 from ldtrefl.world.triangle_numbers import MOST_NUMBERS, TriangleNumbers, numbered
 
@@ -67,7 +69,9 @@ class DeviceScene:
             self._place_all(before)
         same_picture = before is not None and before.scene.environment is scene.environment
         lighting_before: LightingRecord | None = before.lighting if before is not None and same_picture else None
-        self.lighting: LightingRecord = lighting_of(scene, self._decoded, device, lighting_before)
+        self.lighting: LightingRecord = lighting_of(
+            scene, self.device_from_world, self._decoded, device, lighting_before
+        )
         self.looks: Looks = self._looks.struct(scene.environment_image)
         self.look_from(scene.camera)
 
@@ -170,14 +174,17 @@ class DeviceScene:
         return float(self.device_from_world[0, 0])
 
     @functools.cached_property
-    def has_looks(self) -> bool:
-        """Whether any object has a look: else kernels are built that know of none."""
-        return bool((self._records["look"] >= 0).any())
-
-    @functools.cached_property
-    def has_dimmed_shadows(self) -> bool:
-        """Whether any object's shadow lets light through, by its alpha: else kernels are built that ask of none."""
-        return self.scene.lighting.shadows and bool(self._looks.let_through(self._records["look"]).any())
+    def features(self) -> ShadingFeatures:
+        """What kernels are built for."""
+        lighting, shaped = self.scene.lighting, [light for light in self.scene.lights if light.kind in SHAPED]
+        return ShadingFeatures(
+            looks=bool((self._records["look"] >= 0).any()),
+            dimmed_shadows=lighting.is_traced and bool(self._looks.let_through(self._records["look"]).any()),
+            shadows=lighting.shadows,
+            occlusion=lighting.occlusion is not None,
+            shaped_lights=bool(shaped),
+            visible_lights=any(light.visible and light.kind != "spot" for light in shaped),
+        )
 
     @functools.cached_property
     def is_reflector(self) -> np.ndarray:

@@ -7,24 +7,38 @@ import warp as wp
 
 from ldtrefl.scene.description import Light, Scene
 from ldtrefl.scene.presets.base import DistantLight
+from ldtrefl.world.blue_noise import blue_noise
 from ldtrefl.world.environment_frame import world_from_environment
-from ldtrefl.world.records import LightingRecord, LightRecord
+from ldtrefl.world.records import LightingRecord, LightRecord, ShapedLightRecord
+from ldtrefl.world.shaped_lights import SHAPED, shaped_light
+
+FARTHEST = 1e30
+"""Distance in device units up to which what dims ambient light may stand: beyond all that there is."""
 
 BRIGHTEST = 1e30
 """Intensity of a point light in device units: what is brighter is white all the same, and this is finite in float32."""
 
 
-def lighting_of(scene: Scene, decoded: wp.array, device: wp.Device, before: LightingRecord | None) -> LightingRecord:
+def lighting_of(
+    scene: Scene, device_from_world: np.ndarray, decoded: wp.array, device: wp.Device, before: LightingRecord | None
+) -> LightingRecord:
     """The environment of a scene, and what its lights share. What depends on the camera's ``up``, the lights among it,
     is left out: :func:`stand_up` sets it before every frame.
 
     Args:
         scene: what has them.
+        device_from_world: (4, 4).
         decoded: (256,) float32, the linear value of every byte.
         device: where they are read.
         before: another record with the same environment picture, which is then used again; or None.
     """
     record = LightingRecord()
+    shaped = [shaped_light(light, device_from_world) for light in scene.lights if light.kind in SHAPED]
+    # Warp makes no array of an empty list.
+    made = wp.array(shaped, dtype=ShapedLightRecord, device=device) if shaped else None
+    record.shaped = wp.empty(0, dtype=ShapedLightRecord, device=device) if made is None else made
+    noise = blue_noise() if shaped or scene.lighting.occlusion is not None else np.empty((0, 0), np.float32)
+    record.noise = wp.array(noise, dtype=float, device=device, copy=False)
     record.ambient = wp.vec3(*scene.ambient)
     record.sky, record.ground = wp.vec3(*scene.environment.sky), wp.vec3(*scene.environment.ground)
     if before is not None:
@@ -38,6 +52,9 @@ def lighting_of(scene: Scene, decoded: wp.array, device: wp.Device, before: Ligh
             setattr(record, name, wp.array(own, dtype=dtype, device=device, copy=False))
     record.decoded = decoded
     record.shadows = int(scene.lighting.shadows)
+    if (occlusion := scene.lighting.occlusion) is not None:
+        record.occlusion_distance = min(occlusion.distance * float(device_from_world[0, 0]), FARTHEST)
+        record.occlusion_samples = occlusion.samples
     record.turn, record.strength = scene.environment.rotation / 360.0 % 1.0, scene.environment.strength
     return record
 
@@ -49,7 +66,7 @@ def stand_up(
     if record.lights is not None and tuple(record.up) == tuple(wp.vec3(*up)):
         return
     record.up = wp.vec3(*up)
-    lights = [_light(light, device_from_world) for light in scene.lights]
+    lights = [_light(light, device_from_world) for light in scene.lights if light.kind not in SHAPED]
     surroundings, strength = scene.environment.surroundings, scene.environment.strength
     if surroundings is not None:
         to_world = world_from_environment(up, scene.environment.rotation)

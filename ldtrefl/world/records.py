@@ -1,4 +1,4 @@
-"""What kernels read of a scene: an object, a light, and all lights with the environment.
+"""What kernels read of a scene: an object, lights, and all lights with the environment.
 
 Three spaces. *World*: the scene file's. *Device*: the world moved and scaled alike along all axes
 (``device_space.py``); all rays and positions in kernels are in it. Positions in it are float64, distances and
@@ -54,11 +54,33 @@ class LightRecord:
     is_in_picture: int  # 1 if the environment's picture shows it: nothing mirrors it again
 
 
+SPHERE = wp.constant(0)
+RECTANGLE = wp.constant(1)
+SPOT = wp.constant(2)
+
+
+@wp.struct
+class ShapedLightRecord:
+    """A light with a shape or a cone, in device space."""
+
+    kind: int  # SPHERE, RECTANGLE or SPOT
+    position: wp.vec3d  # where its middle is
+    radius: float  # sphere: of it; spot: that shadows are as soft as a sphere's; 0 for hard ones
+    axis: wp.vec3  # rectangle, spot: the way that it shines, unit
+    right: wp.vec3  # rectangle: from its middle to the middle of a side
+    up: wp.vec3  # rectangle: the same at right angles
+    cone: wp.vec2  # spot: factor and offset of the cosine with the axis; what they give, from 0 to 1, is squared
+    radiance: wp.vec3  # of its surface; spot: intensity in device units
+    samples: int  # shadow rays
+    visible: int  # 1 if its shape is seen
+
+
 @wp.struct
 class LightingRecord:
     """Lights and environment."""
 
     lights: wp.array(dtype=LightRecord)
+    shaped: wp.array(dtype=ShapedLightRecord)  # further lights
     ambient: wp.vec3  # added irradiance / pi
     sky: wp.vec3  # radiance straight up
     ground: wp.vec3  # radiance straight down
@@ -73,3 +95,6 @@ class LightingRecord:
     sun_radiance: wp.vec3  # of the disc
     decoded: wp.array(dtype=float)  # the linear value of every byte
     shadows: int  # 1 if lights cast shadows
+    occlusion_distance: float  # how far off what dims ambient light may stand, device units
+    occlusion_samples: int  # rays that ask for it
+    noise: wp.array2d(dtype=float)  # the mask that shifts samples from pixel to pixel; empty if there are none

@@ -44,7 +44,7 @@ WRONG: list[tuple[Callable[[], object], str]] = [
     (lambda: Reflection(max_bounces=0), "Reflection: max_bounces: "),
     (lambda: description.Expectation(ssim=2.0), "Expectation: ssim: "),
     (lambda: Scene(camera="front"), "Scene: camera: "),  # type: ignore[arg-type]
-    (lambda: Scene(camera=CAMERA, lights=[{"kind": "spot"}]), r"Scene: lights\[0\]\.kind: "),  # type: ignore[list-item]
+    (lambda: Scene(camera=CAMERA, lights=[{"kind": "tube"}]), r"Scene: lights\[0\]\.kind: "),  # type: ignore[list-item]
     (lambda: Scene(camera=CAMERA, objekts=()), "Scene: unknown key 'objekts'; did you mean 'objects'"),  # type: ignore[call-arg]
     (lambda: dataclasses.replace(CAMERA, width=0), "Camera: width: "),
     (lambda: Scene(camera=CAMERA, objects=(BOX,)).with_object("box", scale=0), "object 'box': Object: scale: "),

@@ -18,14 +18,22 @@ from ldtrefl.tracing.batch import batch_kernel
 from ldtrefl.tracing.bvh import BVH
 from ldtrefl.tracing.closest_hits import closest_hits_kernel
 from ldtrefl.tracing.nothing import NOTHING
+from ldtrefl.world.shading_features import ShadingFeatures
 
 LITTLE = 1
 """Level of optimization. The code is not run, and NVRTC takes a third of the time that it takes for its best; level 0
 has a fault in some versions."""
 
 
-LOOKS = ((False, False), (True, False), (True, True))
-"""Whether any object has a look, and whether any lets light through."""
+FEATURES = (
+    ShadingFeatures(),
+    ShadingFeatures(looks=True),
+    ShadingFeatures(shadows=True),
+    ShadingFeatures(looks=True, shadows=True, dimmed_shadows=True),
+    ShadingFeatures(shaped_lights=True, visible_lights=True),
+    ShadingFeatures(*[True] * 6),
+)
+"""What scenes may have."""
 
 
 def all_kernels() -> list[wp.Kernel]:
@@ -36,11 +44,12 @@ def all_kernels() -> list[wp.Kernel]:
         search_pixels_kernel(tracer, 1)
     for has_looks in (False, True):
         describe_kernel(has_looks)
-    for tracer, looks in itertools.product((NOTHING, BVH, *TRACERS.values()), LOOKS):
-        shade_hits_kernel(tracer, *looks)
-        shade_pixels_kernel(tracer, *looks)
-        shade_reflectors_kernel(tracer, True, *looks)
-        shade_reflectors_kernel(tracer, False, *looks)
+    for tracer, features in itertools.product((NOTHING, BVH, *TRACERS.values()), FEATURES):
+        if features.shadows == (tracer is not NOTHING):
+            shade_hits_kernel(tracer, features)
+            shade_pixels_kernel(tracer, features)
+            shade_reflectors_kernel(tracer, True, features)
+            shade_reflectors_kernel(tracer, False, features)
     return [kernel for kernel in launch.KERNELS if kernel.func.__module__.startswith("ldtrefl.")]
 
 

@@ -38,8 +38,8 @@ WRONG = [
     ("[0.9, 0.9, 0.9]", "[1.5, 0.9, 0.9]", r"object\[0\]\.material\.mirror\[0\]: .*less than or equal to 1, got 1\.5"),
     (
         "[camera]",
-        '[[light]]\nkind = "spot"\n[camera]',
-        r"light\[0\]\.kind: should be 'directional' or 'point', got 'spot'",
+        '[[light]]\nkind = "tube"\n[camera]',
+        r"light\[0\]\.kind: should be 'directional', 'point', 'spot', 'sphere' or 'rectangle', got 'tube'",
     ),
     ("[0.9, 0.9, 0.9]", "1.5", r"object\[0\]\.material\.mirror: should be less than or equal to 1, got 1\.5"),
     ("[0.9, 0.9, 0.9]", '"red"', r"object\[0\]\.material\.mirror: should be a list, got 'red'"),

@@ -9,7 +9,7 @@ from ldtrefl.scene.scene_parts import SceneParts
 
 def rendered(parts: SceneParts) -> np.ndarray:
     """What the first camera sees of parts, lit by their lights alone."""
-    lit = Lighting(ambient=0.0)
+    lit = Lighting(ambient=0.0, shadows=True)
     scene = Scene(camera=parts.cameras[0], lighting=lit, lights=parts.lights, objects=parts.objects)
     return ldtrefl.render(scene, "bvh").image
 
@@ -19,6 +19,9 @@ def test_moved_parts_look_the_same_to_a_moved_camera() -> None:
     lights = (
         Light(kind="point", position=(1, -2, 2), intensity=3.0),
         Light(kind="directional", direction=(1, 1, -1), radiance=1.0),
+        Light(kind="spot", position=(-2, -2, 1), direction=(2, 2, -1), intensity=4.0, radius=0.1),
+        Light(kind="sphere", position=(-1, 1, 2), radius=0.3, radiance=5.0),
+        Light(kind="rectangle", position=(0, -2, -1), direction=(0, 2, 1), up=(1, 1, 0), width=1, height=2, radiance=1),
     )
     objects = (
         Object(name="ball", shape="sphere", scale=(0.5, 1.0, 0.7), rotate=(1, 1, 0, 30)),
@@ -34,4 +37,4 @@ def test_moved_parts_look_the_same_to_a_moved_camera() -> None:
     before = rendered(parts)
     is_seen = np.abs(before - background).max(axis=2) > 1e-3
     difference = np.abs(rendered(after) - before).max(axis=2)
-    assert is_seen.sum() > 100 and np.count_nonzero(difference[is_seen] > 1e-3) <= 2  # at edges rounding decides
+    assert is_seen.sum() > 100 and np.count_nonzero(difference[is_seen] > 1e-3) <= 5  # at edges rounding decides

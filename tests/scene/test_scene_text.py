@@ -45,7 +45,12 @@ def test_all_that_a_scene_may_hold_is_written(tmp_path: Path) -> None:
     scene = Scene(
         camera=ldtrefl.Camera(eye=(0.0, -5.0, 1e-7), look_at=(0.0, 0.0, 1e15), up=(0.0, 1.0, 0.0)),
         environment=Environment(image=str(tmp_path / "sky.exr")),
-        lights=(Light(kind="point", position=(1.0, 2.0, 3.0), intensity=4.0),),
+        lighting=ldtrefl.Lighting(occlusion=ldtrefl.Occlusion(distance=0.5)),
+        lights=(
+            Light(kind="point", position=(1.0, 2.0, 3.0), intensity=4.0),
+            Light(kind="sphere", position=(1.0, 2.0, 3.0), radius=0.5, radiance=4.0, samples=9, visible=False),
+            Light(kind="spot", position=(1.0, 2.0, 3.0), direction=(0.0, 0.0, -1.0), intensity=4.0, outer_angle=20.0),
+        ),
         objects=(
             Object(shape="torus_knot", params={"p": 3, "segments": [60, 8]}, fit=2.0, smooth=False),
             Object(shape="box", scale=(1.0, 2.0, 3.0), material=Material(texture=str(tmp_path / "wood.png"))),

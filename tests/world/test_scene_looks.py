@@ -21,7 +21,7 @@ def scene() -> Scene:
 
 def test_objects_that_look_alike_share_a_look_and_plain_ones_have_none() -> None:
     made = DeviceScene(scene().with_object("square 1", material=Material(emission=1.0)), CPU)
-    assert made.records.numpy()["look"].tolist() == [0, 0, 1, -1] and made.has_looks
+    assert made.records.numpy()["look"].tolist() == [0, 0, 1, -1] and made.features.looks
     assert made.looks.records.shape[0] == 2
     assert not DeviceScene(scene().with_objects({}).with_object("square 1"), CPU).looks.records.shape[0] == 0
 

@@ -111,9 +111,10 @@ def _loaded_scene(
     return mi.load_dict({"type": "scene", "camera": camera, "environment": environment, **named}, optimize=False)
 
 
-def sampling_camera(mi: Any, camera: Camera, deviation: float) -> Any:
+def sampling_camera(camera: Camera, deviation: float) -> Any:
     """A camera that is sampled all over its pixels; its image is filtered by a Gaussian of this standard deviation in
     pixels, which Mitsuba ends at four of them."""
+    mi = mitsuba()
     described = _camera(mi, camera)
     film = described["film"]
     assert isinstance(film, dict)

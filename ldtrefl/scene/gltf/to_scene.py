@@ -165,9 +165,20 @@ class _Builder:
         if light.kind == "directional":
             direction = self.turn[:3, :3] @ light.direction
             return Light(kind="directional", direction=_three(direction), radiance=(red, green, blue))
+        position = _three(self.turn[:3, :3] @ light.position)
         if light.kind == "spot":
-            self.not_shown.append(f"the cone of spot light '{light.name}' (it shines to all sides)")
-        return Light(kind="point", position=_three(self.turn[:3, :3] @ light.position), intensity=(red, green, blue))
+            outer = min(max(math.degrees(light.cone[1]), 0.0), 90.0)
+            inner = min(max(math.degrees(light.cone[0]), 0.0), outer)
+            direction = _three(self.turn[:3, :3] @ light.direction)
+            return Light(
+                kind="spot",
+                position=position,
+                direction=direction,
+                intensity=(red, green, blue),
+                inner_angle=inner,
+                outer_angle=outer,
+            )
+        return Light(kind="point", position=position, intensity=(red, green, blue))
 
     def _camera(self, node: CameraNode) -> Camera:
         eye, forward, up = (self.turn[:3, :3] @ vector for vector in (node.position, node.forward, node.up))

@@ -50,12 +50,12 @@ def test_nodes_without_a_size_are_named(tmp_path: Path, caplog: pytest.LogCaptur
     assert "not shown: node 'hidden'" in caplog.text
 
 
-def test_lights_are_in_radiance(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_lights_are_in_radiance(tmp_path: Path) -> None:
     """A white surface sends back 1 / pi of the light that falls on it."""
     lights = [
         {"type": "directional", "intensity": 3 * math.pi, "color": [1, 0.5, 0]},
         {"type": "point", "intensity": 2 * math.pi},
-        {"type": "spot", "intensity": math.pi, "name": "lamp"},
+        {"type": "spot", "intensity": math.pi, "spot": {"innerConeAngle": 0.1, "outerConeAngle": 2.0}},
     ]
     file = Written(extensions={"KHR_lights_punctual": {"lights": lights}})
     for number in range(3):
@@ -65,7 +65,9 @@ def test_lights_are_in_radiance(tmp_path: Path, caplog: pytest.LogCaptureFixture
     assert sun.radiance == pytest.approx((3, 1.5, 0)) and bulb.intensity == pytest.approx((2, 2, 2))
     np.testing.assert_allclose(sun.direction, [0, 0, -1], atol=1e-15)
     np.testing.assert_allclose(bulb.position, [0, -2, 1])
-    assert lamp.kind == "point" and "the cone of spot light 'lamp'" in caplog.text
+    assert lamp.kind == "spot" and lamp.intensity == pytest.approx((1, 1, 1))
+    np.testing.assert_allclose(lamp.direction, [0, 1, 0], atol=1e-15)  # -z in the file
+    assert lamp.inner_angle == pytest.approx(math.degrees(0.1)) and lamp.outer_angle == 90.0
 
 
 def test_cameras_keep_their_lens_and_shape(tmp_path: Path) -> None:

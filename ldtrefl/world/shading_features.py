@@ -1,0 +1,32 @@
+"""What of a scene shading must know of: kernels are built for that and no more."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+
+@dataclass(frozen=True)
+class ShadingFeatures:
+    """What a scene has that costs time in kernels. None of it costs any where a scene has it not."""
+
+    looks: bool = False
+    """Whether any object has a look."""
+    dimmed_shadows: bool = False
+    """Whether any object lets light through, by the alpha of its look, that rays ask for."""
+    shadows: bool = False
+    """Whether lights cast shadows."""
+    occlusion: bool = False
+    """Whether ambient light is dimmed by what stands close."""
+    shaped_lights: bool = False
+    """Whether there are lights but directional ones and points."""
+    visible_lights: bool = False
+    """Whether the shapes of any are seen."""
+
+    @property
+    def soft_light(self) -> bool:
+        """Whether any light may need several rays from each point."""
+        return self.occlusion or self.shaped_lights
+
+    def without_rays(self) -> ShadingFeatures:
+        """The same where nothing is asked of a tracer."""
+        return replace(self, dimmed_shadows=False, shadows=False, occlusion=False)
