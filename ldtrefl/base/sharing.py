@@ -20,6 +20,19 @@ def shared_while_used(make: Callable[..., Made]) -> Callable[..., Made]:
 
     Arguments are positional and hashable, results can be referred to weakly.
     """
+    return _shared(make, lambda result: True)
+
+
+def shared_while_current(is_current: Callable[[Made], bool]) -> Callable[[Callable[..., Made]], Callable[..., Made]]:
+    """The same of what can go out of date.
+
+    Args:
+        is_current: whether a result still is what ``make`` would make; if not, it is made anew.
+    """
+    return functools.partial(_shared, is_current=is_current)
+
+
+def _shared(make: Callable[..., Made], is_current: Callable[[Made], bool]) -> Callable[..., Made]:
     made: weakref.WeakValueDictionary[Hashable, Any] = weakref.WeakValueDictionary()
     lock = threading.RLock()
 
@@ -27,7 +40,7 @@ def shared_while_used(make: Callable[..., Made]) -> Callable[..., Made]:
     def shared(*arguments: Hashable) -> Made:
         with lock:
             result = made.get(arguments)
-            if result is None:
+            if result is None or not is_current(result):
                 result = made[arguments] = make(*arguments)
             return result
 

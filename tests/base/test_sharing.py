@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 
-from ldtrefl.base.sharing import shared_while_used
+from ldtrefl.base.sharing import shared_while_current, shared_while_used
 
 
 def test_a_result_goes_when_nobody_holds_it() -> None:
@@ -39,3 +39,19 @@ def test_threads_that_ask_at_once_get_the_same() -> None:
     for asker in askers:
         asker.join()
     assert len({id(result) for result in made}) == 1
+
+
+def test_a_result_that_is_no_longer_current_is_made_anew() -> None:
+    current: list[np.ndarray] = []
+
+    @shared_while_current(lambda result: any(result is one for one in current))
+    def make(number: int) -> np.ndarray:
+        return np.zeros(number)
+
+    first = make(3)
+    current.append(first)
+    assert make(3) is first
+    current.clear()
+    second = make(3)
+    current.append(second)
+    assert second is not first and make(3) is second

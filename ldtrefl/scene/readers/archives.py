@@ -16,6 +16,7 @@ from trimesh.exchange.load import mesh_formats
 
 from ldtrefl.base import budget
 from ldtrefl.base.errors import InputError
+from ldtrefl.scene.readers.files_beside import FilesBeside
 
 ARCHIVES = (".zip", ".tar.gz", ".tgz", ".tar.bz2", ".bz2", ".gz")
 """How the names of archives end, longer endings first."""
@@ -33,30 +34,6 @@ CHUNK = 1 << 24
 """Bytes that are unpacked at a time."""
 
 
-class _FilesBeside(resolvers.FilePathResolver):
-    """Reads files of a mesh file's folder, plain ones alone, once the memory for them has been asked for."""
-
-    def get(self, name: str) -> bytes:
-        """The bytes of a file.
-
-        Raises:
-            InputError: it is a pipe, a device or a folder, or too large.
-            FileNotFoundError, ValueError: there is none, or it is not in the folder.
-        """
-        for candidate in (name.strip(), name.strip().lstrip("/"), Path(name).name):
-            try:
-                path = self.absolute(candidate)
-            except ValueError:
-                continue
-            if path.exists():
-                if not path.is_file():
-                    raise InputError(f"'{candidate}' beside it is not a file")
-                budget.take(path.stat().st_size, f"'{candidate}' beside it")
-                return path.read_bytes()
-        self.absolute(name)
-        raise FileNotFoundError(name)
-
-
 def archive_kind(path: str | Path) -> str | None:
     """How the file's name ends, if it is an archive's."""
     return next((ending for ending in ARCHIVES if str(path).lower().endswith(ending)), None)
@@ -71,13 +48,13 @@ def mesh_files(path: str) -> Iterator[tuple[bytes, str, resolvers.Resolver]]:
     kind = archive_kind(path)
     if kind is None:
         budget.take(Path(path).stat().st_size, "the file")
-        yield Path(path).read_bytes(), _kind(path), _FilesBeside(path)
+        yield Path(path).read_bytes(), _kind(path), FilesBeside(path)
         return
     if kind in PACKED_ALONE:
         name = path[: -len(kind)]
         _check_kinds([name])
         with PACKED_ALONE[kind](path) as stream:
-            yield _unpacked(cast(BinaryIO, stream)).getvalue(), _kind(name), _FilesBeside(path)
+            yield _unpacked(cast(BinaryIO, stream)).getvalue(), _kind(name), FilesBeside(path)
         return
     members = _zip_members(path) if kind == ".zip" else _tar_members(path)
     beside = resolvers.ZipResolver({name: io.BytesIO(data) for name, data in members.items()})

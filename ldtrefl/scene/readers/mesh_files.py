@@ -19,7 +19,7 @@ from trimesh.resolvers import Resolver
 
 from ldtrefl.base import budget
 from ldtrefl.base.errors import InputError, printable
-from ldtrefl.base.sharing import shared_while_used
+from ldtrefl.base.sharing import shared_while_current
 from ldtrefl.files.pillow_limit import no_pixel_limit
 from ldtrefl.scene.gltf.asset import Asset
 from ldtrefl.scene.gltf.pieces import placed_pieces
@@ -27,6 +27,7 @@ from ldtrefl.scene.joining import joined_mesh, joining_bytes
 from ldtrefl.scene.mesh import Mesh
 from ldtrefl.scene.piece import Piece
 from ldtrefl.scene.readers.archives import ARCHIVES, archive_kind, mesh_files, mesh_kinds
+from ldtrefl.scene.readers.files_beside import FilesBeside
 from ldtrefl.scene.readers.memory import reading_bytes
 from ldtrefl.scene.readers.obj import pieces_of_obj
 from ldtrefl.scene.readers.off import pieces_of_off
@@ -48,7 +49,7 @@ ALONE = {"off": pieces_of_off, "3mf": pieces_of_3mf, "stl": pieces_of_stl, "stl_
 def load_mesh(path: str | Path) -> Mesh:
     """Read a mesh file of any kind, an archive of such files too; materials and textures come along.
 
-    The same file is read once, and again only when it has changed.
+    The same file is read once, and again only when it or a file beside it that it names has changed.
 
     Raises:
         InputError: the file is missing, unreadable, too large, or holds no sound mesh; the message names it.
@@ -76,7 +77,16 @@ _needed: weakref.WeakKeyDictionary[Mesh, int] = weakref.WeakKeyDictionary()
 """Bytes that were taken for the meshes in use."""
 
 
-@shared_while_used
+_beside: weakref.WeakKeyDictionary[Mesh, list[FilesBeside]] = weakref.WeakKeyDictionary()
+"""The files beside their own that were read for the meshes in use."""
+
+
+def _is_current(mesh: Mesh) -> bool:
+    """Whether the files beside its own are as they were when the mesh was read."""
+    return all(files.are_as_read() for files in _beside[mesh])
+
+
+@shared_while_current(_is_current)
 def _load_mesh(path: str, _modified: int, _size: int) -> Mesh:
     """The mesh of a file as it stands: the time of its last change and its size tell whether it is the same."""
     if archive_kind(path) is None and Path(path).suffix.lower().lstrip(".") not in mesh_kinds():
@@ -85,26 +95,31 @@ def _load_mesh(path: str, _modified: int, _size: int) -> Mesh:
     # What NumPy would warn of ends in a check of the mesh.
     with budget.account(), np.errstate(all="ignore"):
         try:
-            pieces = _read_pieces(path)
+            pieces, files = _read_pieces(path)
             budget.take(joining_bytes(pieces), "its mesh")
-            return joined_mesh(pieces)
+            mesh = joined_mesh(pieces)
+            _beside[mesh] = files
+            return mesh
         except InputError as error:
             raise error.within(path) from None
         except Exception as error:  # whatever a damaged file provokes in a reader is the file's fault
             raise InputError(f"{path}: not a mesh that can be read ({type(error).__name__}: {error})") from error
 
 
-def _read_pieces(path: str) -> list[Piece]:
-    """The pieces of all mesh files in a file."""
+def _read_pieces(path: str) -> tuple[list[Piece], list[FilesBeside]]:
+    """(the pieces of all mesh files in a file, what read the files beside it)."""
     pieces: list[Piece] = []
+    files: list[FilesBeside] = []
     for data, kind, beside in mesh_files(path):
+        if isinstance(beside, FilesBeside):
+            files.append(beside)
         found, not_shown = _read(data, kind, beside)
         pieces += found
         for line in dict.fromkeys(not_shown):
             _log.warning("%s: not shown: %s", path, printable(line))
     if not pieces:
         raise InputError("the mesh has no triangles")
-    return pieces
+    return pieces, files
 
 
 def _read(data: bytes, kind: str, beside: Resolver) -> tuple[list[Piece], list[str]]:

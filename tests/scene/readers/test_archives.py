@@ -1,8 +1,7 @@
-"""The files in archives and beside a mesh: found, and none larger than is allowed."""
+"""The files in archives: found, and none larger than is allowed."""
 
 import gzip
 import io
-import os
 import tarfile
 import zipfile
 from pathlib import Path
@@ -11,7 +10,6 @@ import pytest
 import trimesh
 
 import ldtrefl
-from ldtrefl import InputError
 from ldtrefl.base import budget
 from tests.mesh_writers import packed
 
@@ -66,20 +64,6 @@ def test_archives_of_other_things(tmp_path: Path, name: str) -> None:
     (tmp_path / name).write_bytes(b"not an archive")
     with pytest.raises(ldtrefl.InputError, match=name):
         ldtrefl.load_mesh(tmp_path / name)
-
-
-def test_files_beside_a_mesh_are_plain_files(tmp_path: Path) -> None:
-    """A pipe, a folder or a device in place of a glTF's buffer is a line, and nobody waits for a writer."""
-    trimesh.creation.icosphere(1).export(tmp_path / "ball.gltf")
-    buffer = next(path for path in tmp_path.iterdir() if path.suffix == ".bin")
-    buffer.unlink()
-    os.mkfifo(buffer)
-    with pytest.raises(InputError, match=rf"ball\.gltf: .*'{buffer.name}' beside it is not a file"):
-        ldtrefl.load_mesh(tmp_path / "ball.gltf")
-    buffer.unlink()
-    buffer.mkdir()
-    with pytest.raises(InputError, match=rf"ball\.gltf: .*'{buffer.name}' beside it is not a file"):
-        ldtrefl.load_mesh(tmp_path / "ball.gltf")
 
 
 @pytest.mark.parametrize("name", ["a.obj.gz", "a.obj.bz2", "a.zip"])
