@@ -11,6 +11,9 @@ from ldtrefl.scene.surface_material import PLAIN, SurfaceMaterial
 NEAR_UNIT = 1e-3
 """How far from 1 the length of a stored normal may be, which is then left as it is; others are made unit vectors."""
 
+NARROWEST_SHARE = 1e-6
+"""Of the largest scale of a matrix: one along another axis below this counts as none."""
+
 
 @dataclass(frozen=True, eq=False)
 class Piece:
@@ -46,8 +49,17 @@ def unit_vectors(stored: np.ndarray) -> np.ndarray:
     return made
 
 
+def axes_left(linear: np.ndarray) -> int:
+    """Along how many axes a (3, 3) matrix leaves things a size: 3 for a body, 2 if it flattens them."""
+    sizes = np.linalg.svd(linear, compute_uv=False)
+    return int((sizes > NARROWEST_SHARE * sizes[0]).sum())
+
+
 def moved(piece: Piece, matrix: np.ndarray) -> Piece:
-    """The piece moved by a (4, 4) matrix: normals by the inverse transpose, and faces turned if it mirrors."""
+    """The piece moved by a (4, 4) matrix: normals by the inverse transpose, and faces turned if it mirrors.
+
+    Of what the matrix flattens the facets' normals count: those of a ball's two halves would cancel at its rim.
+    """
     if np.array_equal(matrix, np.eye(4)):
         return piece
     linear = matrix[:3, :3]
@@ -61,5 +73,7 @@ def moved(piece: Piece, matrix: np.ndarray) -> Piece:
     if tangents is not None:
         turned = np.einsum("ni,ki->nk", tangents[:, :3], linear)
         tangents = unit_vectors(np.hstack([turned, -tangents[:, 3:] if mirrors else tangents[:, 3:]]))
+    if normals is not None and np.isfinite(linear).all() and axes_left(linear) < 3:
+        normals, tangents = np.zeros(normals.shape), None
     faces = piece.faces[:, ::-1] if mirrors else piece.faces
     return replace(piece, vertices=vertices, faces=faces, normals=normals, tangents=tangents)

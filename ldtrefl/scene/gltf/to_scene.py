@@ -25,6 +25,7 @@ from ldtrefl.scene.gltf.lights import CameraNode, LightNode
 from ldtrefl.scene.gltf.pieces import pieces_of
 from ldtrefl.scene.joining import joined_mesh, joining_bytes
 from ldtrefl.scene.mesh import Mesh
+from ldtrefl.scene.piece import NARROWEST_SHARE, axes_left, moved
 from ldtrefl.scene.readers.archives import mesh_files
 from ldtrefl.scene.scene_parts import OBJECT_BYTES, SceneParts
 
@@ -33,9 +34,6 @@ PIXELS = 768 * 512
 
 WIDEST = 64.0
 """Width over height, or height over width, of an image at most."""
-
-NARROWEST_SHARE = 1e-6
-"""Of a node's largest scale: one along another axis below this leaves no body to its mesh."""
 
 UPRIGHT = {
     "x": ((0, 1, 0), (-1, 0, 0), (0, 0, 1)),
@@ -113,7 +111,7 @@ class _Builder:
     def __init__(self, asset: Asset, turn: np.ndarray) -> None:
         self.asset, self.turn = asset, turn
         self.not_shown: list[str] = []
-        self._meshes: dict[int, Mesh] = {}
+        self._meshes: dict[tuple[int, bytes | None], Mesh] = {}
         self._kept: list[object] = []
         """What the keys of ``_meshes`` are the addresses of."""
         self._used: dict[str, int] = {}
@@ -135,20 +133,30 @@ class _Builder:
     def _objects(self) -> Iterator[Object]:
         for node in self.asset.mesh_nodes():
             matrix = np.einsum("ij,jk->ik", self.turn, node.matrix)
-            if not _has_size(matrix):
+            axes = axes_left(matrix[:3, :3])
+            flattening = matrix[:3, :3] if axes == 2 else None
+            mesh = self._mesh(node, flattening) if axes >= 2 else None
+            if mesh is None or (flattening is not None and _is_a_line(mesh)):
                 self.not_shown.append(f"node '{node.name}' (its scale leaves it no size)")
                 continue
+            if flattening is not None:
+                matrix[:3, :3] = np.eye(3)  # the mesh is flat already
             budget.take(OBJECT_BYTES, "an object")
             try:
-                yield Object(name=self._name(node.name), mesh=self._mesh(node), **placed(matrix))
+                yield Object(name=self._name(node.name), mesh=mesh, **placed(matrix))
             except InputError as error:
                 raise error.within(f"node '{node.name}'") from None
 
-    def _mesh(self, node: MeshNode) -> Mesh:
-        """The mesh of a node; nodes with the same primitives share one."""
-        key = id(node.primitives)
+    def _mesh(self, node: MeshNode, flattening: np.ndarray | None) -> Mesh:
+        """The mesh of a node; nodes with the same primitives share one. An object cannot be placed by a matrix that
+        flattens it, (3, 3): its mesh is made flat in its place."""
+        key = (id(node.primitives), None if flattening is None else flattening.tobytes())
         if key not in self._meshes:
             pieces = pieces_of(node.primitives, self.asset.materials)
+            if flattening is not None:
+                matrix = np.eye(4)
+                matrix[:3, :3] = flattening
+                pieces = [moved(piece, matrix) for piece in pieces]
             budget.take(joining_bytes(pieces), f"the mesh of '{node.name}'")
             self._meshes[key] = joined_mesh(pieces)
             self._kept.append(node.primitives)
@@ -191,10 +199,12 @@ class _Builder:
         return Camera(eye=_three(eye), look_at=_three(eye + reach * forward), up=_three(up), fov_y=node.fov_y, **size)
 
 
-def _has_size(matrix: np.ndarray) -> bool:
-    """Whether a mesh keeps a body under a matrix."""
-    sizes = np.linalg.svd(matrix[:3, :3], compute_uv=False)
-    return bool(np.isfinite(sizes).all() and sizes[-1] > NARROWEST_SHARE * sizes[0])
+def _is_a_line(mesh: Mesh) -> bool:
+    """Whether all triangles of a mesh lie on one line."""
+    used = mesh.vertices[mesh.is_used]
+    centred = used - used.mean(axis=0)
+    spread = np.linalg.eigvalsh(np.einsum("ni,nj->ij", centred, centred))
+    return not spread[1] > NARROWEST_SHARE**2 * spread[2]
 
 
 def _three(vector: np.ndarray) -> tuple[float, float, float]:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 
 import ldtrefl
 from ldtrefl.base.errors import InputError
@@ -48,6 +49,41 @@ def test_nodes_without_a_size_are_named(tmp_path: Path, caplog: pytest.LogCaptur
     file.tree["nodes"][0] |= {"scale": [0, 0, 0], "name": "hidden"}
     assert scene_parts(file.save(tmp_path)).objects == ()
     assert "not shown: node 'hidden'" in caplog.text
+
+
+def test_a_flattened_node_is_shown_flat(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    """A ball without depth is a disc of its radius, whatever normals the file has for it, and faces whoever looks."""
+    ball = trimesh.creation.icosphere(3)
+    file = Written(materials=[{"pbrMetallicRoughness": {"baseColorFactor": [1, 0, 0, 1], "metallicFactor": 0}}])
+    place, side = (file.accessor(of.astype(np.float32)) for of in (ball.vertices, ball.vertex_normals))
+    faces = file.accessor(ball.faces.astype(np.uint16).reshape(-1))
+    file.mesh({"POSITION": place, "NORMAL": side}, indices=faces, material=0)
+    file.tree["nodes"][0] |= {"scale": [2, 2, 0], "translation": [1, 0, 0], "name": "disc"}
+    file.add("nodes", {"mesh": 0, "scale": [2, 2, 0], "translation": [50, 0, 0]})
+    entry, other = scene_parts(file.save(tmp_path)).objects
+    assert entry.geometry is other.geometry and caplog.text == ""
+    light = ldtrefl.Light(kind="directional", direction=(0, 1, 0), radiance=(0.5, 0.5, 0.5))
+    dark = ldtrefl.Environment(sky=(0, 0, 0), ground=(0, 0, 0))
+    pixels = (np.arange(64) + 0.5 - 32) * 2 * 9 * math.tan(math.radians(15)) / 64
+    radius = np.hypot(pixels, pixels[:, None])
+    for eye, shade in ((-9.0, 0.5), (9.0, 0.0)):
+        camera = ldtrefl.Camera(eye=(1, eye, 0), look_at=(1, 0, 0), width=64, height=64, fov_y=30)
+        scene = ldtrefl.Scene(
+            camera=camera, objects=(entry,), lights=(light,), lighting=ldtrefl.Lighting(ambient=0.2), environment=dark
+        )
+        for method in ("bvh", "ldt"):
+            image = ldtrefl.render(scene, method, samples=1).image
+            assert image[radius < 1.9].shape[0] > 1000
+            np.testing.assert_allclose(image[radius < 1.9][:, 0], 0.2 + shade, rtol=0.06)
+            np.testing.assert_array_equal(image[radius > 2.05], 0)
+
+
+def test_what_is_flattened_to_a_line_is_named(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    file = Written()
+    file.quad()
+    file.tree["nodes"][0] |= {"scale": [0, 3, 1], "name": "edge", "rotation": [0.1, 0.2, 0.3, 0.9]}
+    assert scene_parts(file.save(tmp_path)).objects == ()
+    assert "not shown: node 'edge'" in caplog.text
 
 
 def test_lights_are_in_radiance(tmp_path: Path) -> None:
