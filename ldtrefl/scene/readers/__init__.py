@@ -2,6 +2,7 @@
 
     mesh_files.py       load_mesh: a file, or those in an archive -> one mesh
     archives.py         the mesh files in a file
+    byte_order_marks.py texts in UTF-16
     files_beside.py     the files that it names; whether they have changed
     memory.py           how much memory reading one takes
     obj.py, mtl.py      OBJ files, whose text obj_text.py reads, and their materials

@@ -17,6 +17,7 @@ import numpy as np
 
 from ldtrefl.base import budget
 from ldtrefl.files.stored_picture import StoredPicture
+from ldtrefl.scene.readers.byte_order_marks import without_mark
 from ldtrefl.scene.readers.obj_text import BLANKS, CONTINUED, as_text
 from ldtrefl.scene.readers.pictures import (
     Pictures,
@@ -76,7 +77,7 @@ class MaterialLibrary:
         """
         budget.take(BYTES_PER_BYTE * len(data), "the materials")
         entry: Entry = {}
-        data = data.removeprefix(b"\xef\xbb\xbf").replace(b"\r\n", b"\n").replace(b"\r", b"\n") + b"\n"
+        data = without_mark(data).replace(b"\r\n", b"\n").replace(b"\r", b"\n") + b"\n"
         data = CONTINUED.sub(lambda match: match[0].replace(b"\\\n", b" "), data)
         for line in data.translate(BLANKS).split(b"\n"):
             text = as_text(line)

@@ -18,6 +18,7 @@ import numpy as np
 
 from ldtrefl.base import budget
 from ldtrefl.base.errors import InputError
+from ldtrefl.scene.readers.byte_order_marks import without_mark
 from ldtrefl.scene.readers.text_numbers import Lines
 
 BLOCK = 1 << 20
@@ -227,7 +228,8 @@ def read_tables(data: bytes) -> ObjTables:
     """
     reader, line = _Reader(), 1
     longest, taken = 0, 0
-    for block in _blocks(data.removeprefix(b"\xef\xbb\xbf")):
+    data = without_mark(data)
+    for block in _blocks(data):
         # Blocks are read one after another: the longest counts.
         budget.take(BYTES_PER_TEXT_BYTE * max(len(block) - longest, 0), "a block of lines")
         longest = max(longest, len(block))

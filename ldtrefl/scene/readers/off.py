@@ -16,6 +16,7 @@ from ldtrefl.base import budget
 from ldtrefl.base.errors import InputError
 from ldtrefl.files.srgb import linear_from_srgb
 from ldtrefl.scene.piece import Piece, unit_vectors
+from ldtrefl.scene.readers.byte_order_marks import without_mark
 from ldtrefl.scene.readers.corner_tables import (
     check_vertices,
     cut_faces,
@@ -75,7 +76,7 @@ def _read(data: bytes) -> tuple[list[Piece], list[str]]:
 
 def _lines(data: bytes) -> tuple[tuple[bool, ...], Lines]:
     """(what the first word says: ST, C, N, 4, n; the lines behind it)."""
-    text = data.removeprefix(b"\xef\xbb\xbf").replace(b"\r\n", b"\n").replace(b"\r", b"\n").replace(b"\t", b" ")
+    text = without_mark(data).replace(b"\r\n", b"\n").replace(b"\r", b"\n").replace(b"\t", b" ")
     text = COMMENT.sub(b"", text).lstrip(b" \n")
     word = WORD.match(text)
     letters = tuple(bool(group) for group in word.groups()) if word else (False,) * 5

@@ -14,6 +14,7 @@ from ldtrefl.base import budget
 from ldtrefl.base.errors import InputError
 from ldtrefl.files.srgb import linear_from_srgb
 from ldtrefl.scene.piece import Piece, unit_vectors
+from ldtrefl.scene.readers.byte_order_marks import without_mark
 from ldtrefl.scene.readers.corner_tables import (
     check_vertices,
     cut_faces,
@@ -44,6 +45,7 @@ def pieces_of_ply(data: bytes, beside: Beside) -> tuple[list[Piece], list[str]]:
     Raises:
         InputError: it is damaged, has no faces, or a face has a vertex that there is not.
     """
+    data = without_mark(data)
     header = read_header(data)
     notes: list[str] = []
     looks = _looks(header.comments, Pictures(beside), notes)

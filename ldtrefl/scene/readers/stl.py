@@ -13,6 +13,7 @@ import numpy as np
 from ldtrefl.base import budget
 from ldtrefl.base.errors import InputError
 from ldtrefl.scene.piece import Piece
+from ldtrefl.scene.readers.byte_order_marks import without_mark
 from ldtrefl.scene.readers.text_numbers import Lines
 
 HEADER = 84
@@ -27,7 +28,7 @@ BYTES_PER_BINARY_BYTE = 4.0
 BYTES_PER_TEXT_BYTE = 12.0
 """What a byte of a text takes while its lines are read; measured."""
 
-TEXT = re.compile(rb"(?:\xef\xbb\xbf)?\s*solid\b", re.IGNORECASE)
+TEXT = re.compile(rb"\s*solid\b", re.IGNORECASE)
 BLANKS = bytes.maketrans(b"\t\v\f\0", b"    ")
 INDENT = re.compile(rb"^ +", re.MULTILINE)
 
@@ -43,7 +44,8 @@ def pieces_of_stl(data: bytes) -> tuple[list[Piece], list[str]]:
         InputError: it is damaged, or has no facets.
     """
     with budget.given_back():
-        corners, notes = _of_text(data) if _is_text(data) else _of_binary(data)
+        text = b"" if _is_whole_binary(data) else without_mark(data)
+        corners, notes = _of_text(text) if TEXT.match(text) else _of_binary(data)
     if not len(corners):
         raise InputError("the mesh has no triangles: it holds no facet")
     # A facet is all that such a file knows: normals of 0 stand for its own.
@@ -51,11 +53,10 @@ def pieces_of_stl(data: bytes) -> tuple[list[Piece], list[str]]:
     return [Piece(corners, faces, np.zeros(corners.shape), None)], notes
 
 
-def _is_text(data: bytes) -> bool:
-    """Whether a file is a text. Binary ones may begin with 'solid', too, but their length tells."""
+def _is_whole_binary(data: bytes) -> bool:
+    """Whether a file is a binary one by its length, since those may begin with 'solid', too."""
     count = int.from_bytes(data[80:HEADER], "little")
-    is_whole = len(data) >= HEADER and len(data) == HEADER + FACET.itemsize * count
-    return not is_whole and TEXT.match(data) is not None
+    return len(data) >= HEADER and len(data) == HEADER + FACET.itemsize * count
 
 
 def _of_binary(data: bytes) -> tuple[np.ndarray, list[str]]:
@@ -80,7 +81,7 @@ def _of_binary(data: bytes) -> tuple[np.ndarray, list[str]]:
 def _of_text(data: bytes) -> tuple[np.ndarray, list[str]]:
     """((corners, 3) float64, what is not shown) of a text."""
     budget.take(BYTES_PER_TEXT_BYTE * len(data), "its lines")
-    text = data.removeprefix(b"\xef\xbb\xbf").replace(b"\r\n", b"\n").replace(b"\r", b"\n").translate(BLANKS).lower()
+    text = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n").translate(BLANKS).lower()
     lines = Lines.of(INDENT.sub(b"", text) + b"\n", 1)
     first, last = lines.letters(0), lines.letters(len(KEYWORD) - 1)
     is_corner = (first == ord("v")) & (last == ord("x"))
