@@ -6,6 +6,7 @@
     rotate = [0.0, 0.0, 1.0, 90.0]
     translate = [0.0, 0.0, 0.5]
     lights = true                   # bring its lights
+    lenient = false                 # show what can be read of it if it requires extensions that are not
     parts = { "glass*" = { mirror = 0.9 } }  # what is said of nodes or materials of these names
 
 Its nodes become objects under their names, its lights are added to the scene's, and where the scene file has no
@@ -49,6 +50,8 @@ class Include:
     translate: Vector = (0.0, 0.0, 0.0)
     lights: Flag = True
     """Whether its lights are brought."""
+    lenient: Flag = False
+    """Whether what can be read is shown of a file that requires extensions which are not."""
     parts: Mapping[str, Material] = Field(default_factory=dict)
     """Names of its nodes or materials, or patterns of such with * and ?: what is said of them in place of the file."""
 
@@ -91,7 +94,8 @@ def read_includes(includes: list[Include], find: Callable[[str, str], str], up: 
         key = f"include[{number}]"
         path = find(include.file, f"{key}.file")
         try:
-            parts = told(scene_parts(Path(path), up=up), _with_pictures_found(include, key, find))
+            held = scene_parts(Path(path), up=up, lenient=include.lenient)
+            parts = told(held, _with_pictures_found(include, key, find))
             found.append(moved_as_told(parts, include))
         except InputError as error:
             raise error.within(key) from None

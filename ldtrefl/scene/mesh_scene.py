@@ -132,12 +132,12 @@ def _kinds(path: Path) -> list[str]:
     return kinds_inside(str(path))
 
 
-def include_of(path: Path, up: UpAxis, turn: float = 0.0) -> Include | None:
+def include_of(path: Path, up: UpAxis, turn: float = 0.0, *, lenient: bool = False) -> Include | None:
     """What a scene file says to have the objects of a file, upright and turned; None if it is no glTF file, and one
     object."""
     if not is_gltf(path):
         return None
-    upright = Include(file=str(path), rotate=FROM_Y_UP[up], lights=False)
+    upright = Include(file=str(path), rotate=FROM_Y_UP[up], lights=False, lenient=lenient)
     return _turned(upright, turn) if turn else upright
 
 

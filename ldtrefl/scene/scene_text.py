@@ -53,7 +53,7 @@ def save_scene(path: str | Path, scene: Scene, include: Include | None = None) -
     Args:
         path: of the scene file.
         scene: what it says.
-        include: what brings those objects whose meshes are in memory.
+        include: what brings those objects whose meshes are in memory, which have one material, if any.
 
     Raises:
         InputError: it cannot be written, or an object's mesh is in no file.
@@ -97,16 +97,20 @@ def scene_text(scene: Scene, path: Path, include: Include | None = None) -> str:
         lines.table("lighting.occlusion", "[lighting.occlusion]", occlusion, is_part=True)
     for light in scene.lights:
         lines.table("light", "[[light]]", _written(light))
-    if include is not None and any(isinstance(entry.mesh, Mesh) for entry in scene.objects):
-        lines.table("include", "[[include]]", _written(include))
+    included = [entry for entry in scene.objects if isinstance(entry.mesh, Mesh)]
+    if included:
+        material = included[0].material
+        if include is None or any(entry.material != material for entry in included):
+            name = included[0].called
+            raise InputError(f"{path}: the mesh of the object '{name}' is in no file that a scene could name")
+        told = include if material == Material() else dataclasses.replace(include, parts={"*": material})
+        lines.table("include", "[[include]]", _written(told))
     for entry in scene.objects:
         if isinstance(entry.mesh, Mesh):
-            if include is not None and entry.material == Material():
-                continue
-            raise InputError(f"{path}: the mesh of the object '{entry.called}' is in no file that a scene could name")
+            continue
         lines.table("object", "[[object]]", _written(entry))
-        if material := list(_material(entry.material)):
-            lines.table("object.material", "[object.material]", material, is_part=True)
+        if own := list(_material(entry.material)):
+            lines.table("object.material", "[object.material]", own, is_part=True)
     if scene.reflection != Reflection():
         lines.table("reflection", "[reflection]", _written(scene.reflection))
     if scene.picture != Picture():
@@ -177,6 +181,8 @@ def _value(value: object) -> str:
         return "true" if value else "false"
     if isinstance(value, str):
         return '"' + "".join(_character(c) for c in value) + '"'
+    if isinstance(value, Material):
+        return _value(dict(_material(value)))
     if isinstance(value, Mapping):
         return "{ " + ", ".join(f"{_key(key)} = {_value(entry)}" for key, entry in value.items()) + " }"
     if isinstance(value, (tuple, list)):

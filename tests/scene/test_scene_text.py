@@ -140,9 +140,26 @@ def test_what_a_gltf_file_holds_is_included(tmp_path: Path) -> None:
         again = ldtrefl.load_scene(tmp_path / "made.toml")
         assert len(again.objects) == len(scene.objects) == 3 + 2
         np.testing.assert_array_equal(ldtrefl.render(again).image, ldtrefl.render(scene).image)
-    mirrors = composed(scene.objects[:3], None, mirror_self=True)
+    mixed = composed((*scene.objects[:2], dataclasses.replace(scene.objects[2], material=Material(mirror=0.5))), None)
     with pytest.raises(ldtrefl.InputError, match="is in no file that a scene could name"):
-        save_scene(tmp_path / "made.toml", mirrors, include_of(path, "y"))
+        save_scene(tmp_path / "made.toml", mixed, include_of(path, "y"))
+
+
+def test_a_lenient_scene_is_lenient_when_it_is_read_again(tmp_path: Path) -> None:
+    """Its nodes stay by themselves, also where they are made mirrors."""
+    file = Written(extensionsUsed=["ACME_hats"], extensionsRequired=["ACME_hats"])
+    file.quad()
+    path = file.save(tmp_path)
+    for on in ("mirror-ball", "chrome"):
+        scene = mesh_scene(path, on, size=(36, 24), lenient=True)
+        save_scene(tmp_path / "made.toml", scene, include_of(path, "y", lenient=True))
+        again = ldtrefl.load_scene(tmp_path / "made.toml")
+        np.testing.assert_allclose(ldtrefl.render(again).image, ldtrefl.render(scene).image, atol=1e-6)  # other order
+    text = (tmp_path / "made.toml").read_text()
+    assert "lenient = true" in text and 'parts = { "*" = { mirror = [0.93, 0.94, 0.95] } }' in text
+    (tmp_path / "made.toml").write_text(text.replace("lenient = true", "lenient = false"))
+    with pytest.raises(ldtrefl.InputError, match=r"made\.toml: include\[0\].*ACME_hats.*lenient = true"):
+        ldtrefl.load_scene(tmp_path / "made.toml")
 
 
 def test_the_mirror_that_is_made_of_a_gltf_file_is_written(tmp_path: Path) -> None:

@@ -106,7 +106,8 @@ def render(
     with _maps_kept(cache, no_cache), budget.account():
         loaded = picture.of_scene(scene_of(scene, on, up, turn, mirror, size, lenient))
         if scene_file is not None:
-            save_scene(scene_file, loaded, include_of(scene, up_axis_of(scene, up), turn))
+            include = include_of(scene, up_axis_of(scene, up), turn, lenient=lenient)
+            save_scene(scene_file, loaded, include)
         options = parsed_settings(settings) | ({} if samples is None else {"samples": samples})
         # Before they are passed on by name: one may be called as a parameter of Renderer is.
         find_method(loaded.reflection.method if method is None else method).configured(options)

@@ -48,7 +48,8 @@ def check_required(document: Document, *, lenient: bool) -> None:
     """
     unknown = sorted(set(_names(document, "extensionsRequired")) - READ - OPAQUE - HARMLESS)
     if unknown and not lenient:
-        raise InputError(f"it requires {', '.join(unknown)}, which is not read (--lenient tries all the same)")
+        way_round = "--lenient, or lenient = true of an [[include]], tries all the same"
+        raise InputError(f"it requires {', '.join(unknown)}, which is not read ({way_round})")
 
 
 def not_shown(document: Document) -> list[str]:

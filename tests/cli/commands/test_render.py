@@ -7,6 +7,7 @@ import pytest
 
 import ldtrefl
 from tests.cli.conftest import Done
+from tests.scene.gltf.writer import Written
 
 
 @pytest.mark.parametrize(
@@ -51,6 +52,16 @@ def test_a_mesh_on_a_stage_and_its_scene_file(run: Callable[..., Done], scene_fo
     assert 'up_axis = "-y"' in made and "rotate = [0.0, 0.0, 1.0, 35.0]" in made
     assert run("render", "made.toml").status == 0
     assert (scene_folder / "made.png").read_bytes() == (scene_folder / "thing.png").read_bytes()
+
+
+def test_a_lenient_render_saves_a_lenient_scene(run: Callable[..., Done], scene_folder: Path) -> None:
+    file = Written(extensionsUsed=["ACME_hats"], extensionsRequired=["ACME_hats"])
+    file.quad()
+    file.save(scene_folder, "hats.glb")
+    options = ("--lenient", "--size", "36x24", "--save-scene", "made.toml")
+    assert run("render", "hats.glb", *options).status == 0
+    assert run("render", "made.toml").status == 0
+    assert (scene_folder / "made.png").read_bytes() == (scene_folder / "hats.png").read_bytes()
 
 
 def test_a_mesh_by_itself_says_what_is_up(run: Callable[..., Done], scene_folder: Path) -> None:
