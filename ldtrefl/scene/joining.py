@@ -1,7 +1,7 @@
 """Pieces of a mesh file -> one mesh, each piece a part of it.
 
 Triangles stand in the order of the file, part by part. Normals that a file stores are used; pieces without any get
-smooth ones, each piece by itself: the file says that they are not one surface.
+smooth ones, each piece by itself unless it continues another: the file says that they are not one surface.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ def joining_bytes(pieces: list[Piece]) -> float:
 
 
 def joined_mesh(pieces: list[Piece]) -> Mesh:
-    """One mesh of all pieces, each a part. Smooth normals are made where a piece has none, piece by piece.
+    """One mesh of all pieces, each a part. Smooth normals are made where a piece has none, surface by surface.
 
     Raises:
         InputError: the pieces are no sound mesh, or a texture is damaged.
@@ -48,9 +48,11 @@ def _with_normals(mesh: Mesh, pieces: list[Piece], first_vertex: np.ndarray, fir
     normals.flags.writeable = False  # and so it is not copied
     if not is_without.any():
         return mesh.with_normals(normals)
-    number = np.repeat(np.arange(len(pieces)), np.diff(first_vertex))
+    surfaces = np.cumsum([not piece.continues for piece in pieces])
+    number = np.repeat(surfaces, np.diff(first_vertex))
     triangles = np.flatnonzero(np.repeat(is_without, np.diff(first_triangle)))
-    return smoothed(mesh.with_normals(normals), is_without[number], triangles, number if len(pieces) > 1 else None)
+    is_of = np.repeat(is_without, np.diff(first_vertex))
+    return smoothed(mesh.with_normals(normals), is_of, triangles, number if surfaces[-1] > surfaces[0] else None)
 
 
 def _more_of_vertices(pieces: list[Piece]) -> dict[str, np.ndarray | None]:

@@ -34,6 +34,8 @@ class Piece:
     """(n, 4) float32, linear, with alpha."""
     tangents: np.ndarray | None = None
     """(n, 4) float64: the way of u along the surface, and the sign of the bitangent."""
+    continues: bool = False
+    """Whether it is of one surface with the piece before it: smooth normals do not end at their border."""
 
 
 def unit_vectors(stored: np.ndarray) -> np.ndarray:

@@ -24,6 +24,19 @@ def test_pieces_without_normals_get_smooth_ones_each_by_itself() -> None:
     np.testing.assert_array_equal(mesh.normals[count:], ldtrefl.Mesh(ball.vertices, upper).normals)
 
 
+def test_a_piece_that_continues_another_is_smooth_with_it() -> None:
+    ball = trimesh.creation.icosphere(3)
+    upper = ball.triangles_center[:, 2] > 0
+    for continues, most in ((True, 0.01), (False, 0.3)):
+        pieces = [
+            Piece(ball.vertices, ball.faces[upper], None, None),
+            Piece(ball.vertices, ball.faces[~upper], None, None, continues=continues),
+        ]
+        mesh = joined_mesh(pieces)
+        away = np.abs(mesh.normals - mesh.vertices)[mesh.is_used].max()
+        assert away < most and (continues or away > 0.03), "by itself each half has a rim"
+
+
 def test_no_primitive_of_many_is_lost(tmp_path: Path) -> None:
     """20,000 primitives in under a megabyte; trimesh's own scene drops a dozen of them."""
     positions = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)

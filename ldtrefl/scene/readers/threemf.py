@@ -84,6 +84,8 @@ class _Package:
     meshes: dict[Key, _Mesh] = field(default_factory=dict)
     components: dict[Key, list[tuple[Key, np.ndarray]]] = field(default_factory=dict)
     colors: dict[Key, list[tuple[float, ...]]] = field(default_factory=dict)
+    names: dict[Key, list[str]] = field(default_factory=dict)
+    """Of base materials."""
     uvs: dict[Key, tuple[str, list[tuple[float, float]]]] = field(default_factory=dict)
     textures: dict[Key, Texture | None] = field(default_factory=dict)
     scales: dict[str, float] = field(default_factory=dict)
@@ -115,6 +117,8 @@ class _Package:
                 self._object(entry, key)
             elif kind in ("basematerials", "colorgroup"):
                 self.colors[key] = [_color(of.get("displaycolor") or of.get("color") or "#FFFFFF") for of in entry]
+                if kind == "basematerials":
+                    self.names[key] = [of.get("name", "") for of in entry]
             elif kind == "texture2dgroup":
                 pairs = [(float(of.get("u", 0)), float(of.get("v", 0))) for of in entry]
                 self.uvs[key] = (entry.get("texid", ""), pairs)
@@ -159,7 +163,7 @@ class _Package:
             yield from self.placed(other, np.einsum("ij,jk->ik", matrix, self.scaled(place, key[0])), depth + 1)
 
     def pieces(self, key: Key) -> list[Piece]:
-        """A mesh as pieces, one for each picture, in millimetres."""
+        """A mesh as pieces, one for each picture and each base material, in millimetres."""
         mesh, name = self.meshes[key], key[0]
         count = len(mesh.vertices)
         if not len(mesh.triangles):
@@ -167,10 +171,24 @@ class _Package:
         if int(mesh.triangles.min()) < 0 or int(mesh.triangles.max()) >= count:
             wrong = int(np.argmax((mesh.triangles < 0) | (mesh.triangles >= count)) // 3)
             raise InputError(f"object {key[1]}: triangle {wrong} has a vertex that there is not, of {count}")
-        groups = np.array([self.uvs.get((name, of), ("", []))[0] for of in mesh.groups])
-        return [self._piece(mesh, name, str(texture), groups == texture) for texture in dict.fromkeys(groups.tolist())]
+        looks, numbers = self._looks(mesh, name)
+        used = [k for k in range(len(looks)) if (numbers == k).any()]
+        pieces = [self._piece(mesh, name, *looks[k], numbers == k) for k in used]
+        return [replace(piece, continues=k > 0) for k, piece in enumerate(pieces)]
 
-    def _piece(self, mesh: _Mesh, name: str, texture: str, chosen: np.ndarray) -> Piece:
+    def _looks(self, mesh: _Mesh, name: str) -> tuple[list[tuple[str, str]], np.ndarray]:
+        """((the id of a picture, the name of a base material) of each look; (m,) which look each triangle has)."""
+        looks: dict[tuple[str, str], int] = {}
+        groups, numbers = np.array(mesh.groups), np.zeros(len(mesh.groups), np.int64)
+        for group in dict.fromkeys(mesh.groups):
+            texture, names = self.uvs.get((name, group), ("", []))[0], self.names.get((name, group), [])
+            chosen = groups == group
+            found = [looks.setdefault((texture, material), len(looks)) for material in names or [""]]
+            first = np.clip(mesh.properties[chosen, 0] if names else 0, 0, len(found) - 1)
+            numbers[chosen] = np.array(found)[first]
+        return list(looks), numbers
+
+    def _piece(self, mesh: _Mesh, name: str, texture: str, material: str, chosen: np.ndarray) -> Piece:
         triangles = mesh.triangles[chosen]
         rows = np.ones((len(triangles), 3, 2 if texture else 4), np.float64)
         groups = np.array(mesh.groups)[chosen]
@@ -187,13 +205,22 @@ class _Package:
             rows[groups == group] = table[numbers]
         look = PLAIN if not texture else replace(PLAIN, name=texture, base_texture=self.textures.get((name, texture)))
         vertices = mesh.vertices * self.scales[name]
-        if not texture and (rows == 1.0).all():
+        if material:
+            look = replace(look, name=material)
+            if (rows == rows[0, 0]).all():
+                red, green, blue, alpha = rows[0, 0].tolist()
+                look, rows = replace(look, base_color=(red, green, blue)), np.ones(rows.shape)
+                if alpha < 1.0:
+                    self.note("alpha of its colours")
+        if not texture and (rows == 1.0).all() and chosen.all():
             return Piece(vertices, triangles, None, None, look)
         corners, faces = split_corners(triangles, rows.reshape(-1, rows.shape[2]))
         values_of = rows.reshape(-1, rows.shape[2])[corners].astype(np.float32)
         taken = vertices[triangles.reshape(-1)[corners]]
         if texture:
             return Piece(taken, faces, None, values_of, look)
+        if (rows == 1.0).all():
+            return Piece(taken, faces, None, None, look)
         return Piece(taken, faces, None, None, look, colors=values_of)
 
     def scaled(self, place: np.ndarray, name: str) -> np.ndarray:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from PIL import Image
 
 import ldtrefl
@@ -63,7 +64,41 @@ def test_colors_of_corners_triangles_and_objects(tmp_path: Path) -> None:
     )
     mesh = loaded(tmp_path, colors + base + mesh_object(1, triangles, 'pid="6" pindex="0"'), '<item objectid="1"/>')
     red, green, blue = [1, 0, 0, 1], [0, 1, 0, 128 / 255], [0, 0, 1, 1]
-    np.testing.assert_allclose(mesh.colors[mesh.faces], [[red, green, red], [green] * 3, [blue] * 3], atol=1e-6)
+    white = [1, 1, 1, 1]
+    np.testing.assert_allclose(mesh.colors[mesh.faces], [[red, green, red], [green] * 3, [white] * 3], atol=1e-6)
+    assert [part.material.base_color for part in mesh.parts] == [(1, 1, 1), tuple(blue[:3])]
+
+
+def test_base_materials_are_parts_of_their_names(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    """A ball of two materials is smooth over their border."""
+    ball = trimesh.creation.icosphere(3)
+    is_upper = ball.triangles_center[:, 2] > 0
+    base = (
+        '<basematerials id="6"><base name="unused"/><base name="Red PLA" displaycolor="#FF0000"/>'
+        '<base name="Blue PLA" displaycolor="#0000FF80"/></basematerials>'
+    )
+    vertices = "".join(f'<vertex x="{x}" y="{y}" z="{z}"/>' for x, y, z in ball.vertices)
+    triangles = "".join(
+        f'<triangle v1="{a}" v2="{b}" v3="{c}"' + (' pid="6" p1="2"/>' if upper else "/>")
+        for (a, b, c), upper in zip(ball.faces, is_upper, strict=True)
+    )
+    mesh_text = f"<mesh><vertices>{vertices}</vertices><triangles>{triangles}</triangles></mesh>"
+    resources = base + f'<object id="1" pid="6" pindex="1">{mesh_text}</object>'
+    mesh = loaded(tmp_path, resources, '<item objectid="1"/>')
+    named = {part.material.name: part.material.base_color for part in mesh.parts}
+    assert named == {"Red PLA": (1, 0, 0), "Blue PLA": (0, 0, 1)} and mesh.colors is None
+    assert "not shown: alpha of its colours" in caplog.text
+    first = {part.material.name: part.first_triangle for part in mesh.parts}
+    centres = mesh.vertices[mesh.faces].mean(axis=1)
+    upper = np.roll(np.arange(len(mesh.faces)) < is_upper.sum(), first["Blue PLA"])
+    np.testing.assert_array_equal(centres[:, 2] > 0, upper)
+    np.testing.assert_allclose(mesh.normals, mesh.vertices, atol=0.01)
+    (tmp_path / "a.toml").write_text(
+        "[camera]\neye = [0, -5, 0]\nlook_at = [0, 0, 0]\n"
+        '[[object]]\nmesh = "a.3mf"\nparts = { "Blue*" = { mirror = 0.9 } }\n'
+    )
+    entry = ldtrefl.load_scene(tmp_path / "a.toml").objects[0]
+    assert entry.material_of("Blue PLA").mirror[0] == 0.9 and entry.material_of("Red PLA").mirror[0] == 0
 
 
 def test_pictures_are_parts(tmp_path: Path) -> None:
