@@ -36,7 +36,7 @@ from ldtrefl.methods.base import RaylessMethod, RayMethod
 from ldtrefl.scene.description import Camera, Object, Scene, Vector
 from ldtrefl.tracing.nothing import shadow_tracer
 from ldtrefl.tracing.tracer import BoundTracer
-from ldtrefl.world.device_scene import DeviceScene
+from ldtrefl.world.device_scene import DeviceScene, Uploads
 
 __all__ = ["Frame", "Renderer", "render"]
 
@@ -51,6 +51,9 @@ RAY_COUNTERS = ("rays", "steps", "searches", "searches_saved")
 
 WORKING_BYTES = 200
 """Bytes of a pixel on the way: its key, what it sees, its radiance, its ray and where that ends."""
+
+FOOTPRINT_BYTES = 2 * 48
+"""Bytes of the footprints of its ray and of that which goes on from there, if rays carry them."""
 
 
 class Renderer:
@@ -84,7 +87,10 @@ class Renderer:
         self._name, self._options = kind.name, dict(options)
         self._skip = skip_options_of(config.skip)
         self._sampling = config.sampling(scene)
-        device_scene = DeviceScene(scene, launch.resolve_device(device), skip_attributes=self._skip.attributes)
+        self._uploads = Uploads(
+            self._skip.attributes, config.probes(scene), kind.needs_footprints(config), self._sampling.samples
+        )
+        device_scene = DeviceScene(scene, launch.resolve_device(device), uploads=self._uploads)
         self._device_scene = device_scene
         """As it stood when it was last needed."""
         self._changed: dict[int, Object] = {}
@@ -153,8 +159,8 @@ class Renderer:
         with self._lock:
             if self._changed:
                 before = self._device_scene
-                scene, kept = before.scene.with_objects(self._changed), self._skip.attributes
-                self._device_scene = DeviceScene(scene, before.device, before, skip_attributes=kept)
+                scene = before.scene.with_objects(self._changed)
+                self._device_scene = DeviceScene(scene, before.device, before, uploads=self._uploads)
                 self._changed = {}
             return self._device_scene
 
@@ -177,7 +183,8 @@ class Renderer:
         """Ask for what a frame of this size needs, if none as large has been made."""
         pixels = camera.width * camera.height
         working = pixels if pixels <= LARGEST_WHOLE else BAND_PIXELS
-        needed = IMAGE_BYTES * pixels + WORKING_BYTES * working
+        of_ray = FOOTPRINT_BYTES if self._as_it_stands().features.footprints else 0
+        needed = IMAGE_BYTES * pixels + (WORKING_BYTES + of_ray) * working
         if needed > self._bytes_taken:
             budget.take(needed, f"an image of {camera.width} x {camera.height} pixels", SMALLER)
             self._bytes_taken = needed

@@ -22,14 +22,15 @@ from ldtrefl.device.bits import lowest_bit
 from ldtrefl.device.stats import Stats
 from ldtrefl.frame.gbuffer import GBuffer, GBufferView, pattern_place
 from ldtrefl.frame.ray_counts import counts_of
+from ldtrefl.frame.ray_ends import brought_by, carry_on, go_on, meeting_lights
 from ldtrefl.frame.regions import Regions
 from ldtrefl.frame.shadows import shaded_by
 from ldtrefl.frame.skip_options import SkipOptions
 from ldtrefl.frame.taken_rays import taken
+from ldtrefl.geometry.footprint import Footprint
 from ldtrefl.geometry.vectors import point_along
-from ldtrefl.shading.environment import environment_radiance
-from ldtrefl.shading.light_shapes import seen_light
-from ldtrefl.shading.surface import Surface, extended_coordinates, may_return, way_onwards
+from ldtrefl.shading.ray_footprint import meet
+from ldtrefl.shading.surface import Surface, extended_coordinates
 from ldtrefl.shading.surfaces import GROUP, Sighting, look_along
 from ldtrefl.tracing.closest_hits import closest_hits_kernel
 from ldtrefl.tracing.nothing import no_shadows
@@ -85,33 +86,6 @@ def placed_on_ray(
 
 
 @wp.func
-def go_on(
-    objects: wp.array(dtype=ObjectRecord),
-    lighting: LightingRecord,
-    rays: RayBuffer,
-    i: int,
-    surface: Surface,
-    least_weight: float,
-    onwards_out: RayBuffer,
-) -> wp.vec3:
-    """Send ray ``i`` on from a mirror, or behind what lets it through; or, if too little of what it brings would
-    arrive, what it would see there of the environment."""
-    direction = way_onwards(surface, rays.direction[i])
-    onwards = wp.cw_mul(rays.throughput[i], surface.mirror)
-    if wp.max(onwards) < least_weight:
-        return wp.cw_mul(surface.mirror, environment_radiance(lighting, direction))
-    onwards_out.pixel[i] = rays.pixel[i]
-    onwards_out.origin[i] = surface.position
-    onwards_out.direction[i] = direction
-    onwards_out.throughput[i] = onwards
-    onwards_out.source[i] = surface.object
-    onwards_out.source_triangle[i] = surface.triangle
-    returns = may_return(objects[surface.object], surface)
-    onwards_out.may_return[i] = wp.where(returns, wp.uint8(1), wp.uint8(0))
-    return wp.vec3(0.0)
-
-
-@wp.func
 def add_brought(radiance: wp.array(dtype=wp.vec3), numbers: wp.array(dtype=wp.int32), i: int, brought: wp.vec3):
     """Add what ray ``i`` brings; ``numbers`` are the rays' among the first bounce's, none if they are those."""
     number = int(i)
@@ -120,18 +94,11 @@ def add_brought(radiance: wp.array(dtype=wp.vec3), numbers: wp.array(dtype=wp.in
     radiance[number] = radiance[number] + brought
 
 
-@wp.func
-def brought_by(lighting: LightingRecord, rays: RayBuffer, i: int, light: int) -> wp.vec3:
-    """What ray ``i``, which ends at no object, brings of the environment; or of a light, if the number is not -1."""
-    if light >= 0:
-        return wp.cw_mul(rays.throughput[i], lighting.shaped[light].radiance)
-    return wp.cw_mul(rays.throughput[i], environment_radiance(lighting, rays.direction[i]))
-
-
 @launch.once
 def shade_hits_kernel(tracer: Tracer, features: ShadingFeatures) -> wp.Kernel:
     """The kernel that adds what rays met to what they bring, and sends them on from mirrors."""
-    shaded, with_visible_lights = shaded_by(tracer, features), wp.constant(features.visible_lights)
+    shaded, light_met = shaded_by(tracer, features), meeting_lights(features.visible_lights)
+    with_footprints = wp.constant(features.footprints)
 
     @launch.kernel
     def shade_hits(
@@ -157,16 +124,13 @@ def shade_hits_kernel(tracer: Tracer, features: ShadingFeatures) -> wp.Kernel:
         sight_memory, surface_memory = wp.zeros(shape=GROUP, dtype=Sighting), wp.zeros(shape=GROUP, dtype=Surface)
         sightings = wp.array(ptr=sight_memory.ptr, shape=(GROUP,), dtype=Sighting)
         surfaces = wp.array(ptr=surface_memory.ptr, shape=(GROUP,), dtype=Surface)
-        begin = block * (first + wp.tid())
-        end = wp.min(begin + block, rays.source.shape[0])
+        begin, end = block * (first + wp.tid()), wp.min(block * (first + wp.tid()) + block, rays.source.shape[0])
         while begin < end:
             lanes = int(0)
             for i in range(begin, wp.min(begin + GROUP, end)):
                 onwards_out.source[i] = -1
                 if rays.source[i] >= 0:
-                    light = int(-1)
-                    if with_visible_lights:
-                        light = seen_light(lighting, rays.origin[i], rays.direction[i], hits.t[i])
+                    light = light_met(lighting, rays, hits, i)
                     if hits.object[i] >= 0 and light < 0:
                         sight_hit(objects, rays, hits, i, sightings, i - begin)
                         lanes = lanes | (1 << (i - begin))
@@ -178,10 +142,15 @@ def shade_hits_kernel(tracer: Tracer, features: ShadingFeatures) -> wp.Kernel:
                 lanes = lanes & (lanes - 1)
                 i = begin + lane
                 surfaces[lane].position = placed_on_ray(objects, rays, hits, i, surfaces[lane].position)
+                met = Footprint()
+                if with_footprints:
+                    met = meet(objects, rays.footprint[i], hits.t[i], surfaces[lane], sightings, lane)
                 place = pattern_place(gbuffer, rays.pixel[i])
                 leaving = shaded(views, objects, top, lighting, looks, sightings, lane, surfaces, place)
                 if wp.max(surfaces[lane].mirror) > 0.0:
                     leaving += go_on(objects, lighting, rays, i, surfaces[lane], least_weight, onwards_out)
+                    if with_footprints:
+                        carry_on(objects, met, surfaces[lane], sightings, lane, i, onwards_out)
                 add_brought(radiance, numbers, i, wp.cw_mul(rays.throughput[i], leaving))
             begin += GROUP
 
@@ -347,10 +316,8 @@ class RayFollower:
             launch.launch(kernel, -(-count // block), inputs, device)
             self._count(rays, hits)
         with self.stats.stage("shade", device):
-            shadow, onwards = (
-                tracer if scene.scene.lighting.is_traced else no_shadows(device),
-                empty_rays(count, device),
-            )
+            shadow = tracer if scene.scene.lighting.is_traced else no_shadows(device)
+            onwards = empty_rays(count, device, carries_footprints=scene.features.footprints)
             places = wp.array(np.empty(0, np.int32) if numbers is None else numbers, dtype=wp.int32, device=device)
             weight = np.inf if is_last else self.limits.least_weight
             block = block_of(device)

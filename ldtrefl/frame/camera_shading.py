@@ -9,14 +9,16 @@ from ldtrefl.device.bits import lowest_bit
 from ldtrefl.frame.backdrop import fill_backdrop, fill_lights
 from ldtrefl.frame.gbuffer import GBuffer, GBufferView, pattern_place, sight
 from ldtrefl.frame.shadows import shaded_by
+from ldtrefl.geometry.footprint import Footprint
 from ldtrefl.geometry.vectors import from_to
 from ldtrefl.shading.light_shapes import seen_light
+from ldtrefl.shading.ray_footprint import is_textured, leave, meet
 from ldtrefl.shading.surface import Surface, may_return, way_onwards
 from ldtrefl.shading.surfaces import GROUP, Sighting, look_from
 from ldtrefl.tracing.nothing import no_shadows
 from ldtrefl.tracing.ray_buffers import RayBuffer, empty_rays
 from ldtrefl.tracing.tracer import BoundTracer, Tracer, block_of
-from ldtrefl.world.camera import CameraView
+from ldtrefl.world.camera import CameraView, camera_footprint
 from ldtrefl.world.look_records import Looks
 from ldtrefl.world.records import LightingRecord, ObjectRecord
 from ldtrefl.world.shading_features import ShadingFeatures
@@ -43,6 +45,7 @@ def light_before(
 def shade_pixels_kernel(tracer: Tracer, features: ShadingFeatures) -> wp.Kernel:
     """The kernel that shades what the camera sees, reflectors left out."""
     shaded, with_visible_lights = shaded_by(tracer, features), wp.constant(features.visible_lights)
+    filters = wp.constant(features.probes > 0)
 
     @launch.kernel
     def shade_pixels(
@@ -82,6 +85,9 @@ def shade_pixels_kernel(tracer: Tracer, features: ShadingFeatures) -> wp.Kernel:
             while lanes != 0:
                 lane = lowest_bit(wp.uint64(lanes))
                 lanes = lanes & (lanes - 1)
+                if filters:
+                    if is_textured(objects[surfaces[lane].object]):
+                        meet_from_eye(gbuffer.camera, objects, surfaces[lane], sightings, lane)
                 light = int(-1)
                 if with_visible_lights:
                     light = light_before(gbuffer.camera, lighting, sightings, lane, surfaces)
@@ -93,6 +99,19 @@ def shade_pixels_kernel(tracer: Tracer, features: ShadingFeatures) -> wp.Kernel:
                     radiance_out[begin + lane] = leaving
 
     return shade_pixels
+
+
+@wp.func
+def meet_from_eye(
+    camera: CameraView,
+    objects: wp.array(dtype=ObjectRecord),
+    surface: Surface,
+    sightings: wp.array(dtype=Sighting),
+    lane: int,
+) -> Footprint:
+    """The footprint of the camera's ray where it meets a lane's surface; the lane's spread is set."""
+    distance = wp.length(from_to(camera.eye, surface.position))
+    return meet(objects, camera_footprint(camera, sightings[lane].way), distance, surface, sightings, lane)
 
 
 @wp.func
@@ -110,9 +129,9 @@ def start_ray(rays: RayBuffer, i: int, objects: wp.array(dtype=ObjectRecord), su
 @launch.once
 def shade_reflectors_kernel(tracer: Tracer, starts_rays: bool, features: ShadingFeatures) -> wp.Kernel:
     """The kernel that shades the pixels that see a reflector, without what it reflects, and starts their rays if
-    ``starts_rays``."""
+    ``starts_rays``; with their footprints, if the scene has textures that are filtered."""
     shaded, with_rays = shaded_by(tracer, features), wp.constant(starts_rays)
-    with_visible_lights = wp.constant(features.visible_lights)
+    with_visible_lights, with_footprints = wp.constant(features.visible_lights), wp.constant(features.footprints)
 
     @launch.kernel
     def shade_reflectors(
@@ -144,6 +163,9 @@ def shade_reflectors_kernel(tracer: Tracer, starts_rays: bool, features: Shading
             look_from(objects, (1 << count) - 1, gbuffer.camera.eye, sightings, surfaces)
             for lane in range(count):
                 pixel = pixels[begin + lane]
+                met = Footprint()
+                if with_footprints:
+                    met = meet_from_eye(gbuffer.camera, objects, surfaces[lane], sightings, lane)
                 place = pattern_place(gbuffer, pixel)
                 radiance_out[pixel] = shaded(views, objects, top, lighting, looks, sightings, lane, surfaces, place)
                 if with_visible_lights:
@@ -155,6 +177,9 @@ def shade_reflectors_kernel(tracer: Tracer, starts_rays: bool, features: Shading
                 if with_rays:
                     rays.pixel[begin + lane] = pixel
                     start_ray(rays, begin + lane, objects, surfaces[lane], sightings[lane].view)
+                    if with_footprints:
+                        leaving = rays.direction[begin + lane]
+                        rays.footprint[begin + lane] = leave(objects, met, surfaces[lane], sightings, lane, leaving)
             begin += count
 
     return shade_reflectors
@@ -197,7 +222,8 @@ def _with_reflectors(gbuffer: GBuffer, shadow: BoundTracer, radiance: wp.array, 
     """Shade the pixels that see a reflector, where the others are shaded; start their rays."""
     scene, device, pixels = gbuffer.scene, gbuffer.scene.device, gbuffer.reflector_pixels
     count = pixels.shape[0]
-    mirror, rays = wp.empty(count, dtype=wp.vec3, device=device), empty_rays(count if starts_rays else 0, device)
+    mirror = wp.empty(count, dtype=wp.vec3, device=device)
+    rays = empty_rays(count if starts_rays else 0, device, carries_footprints=scene.features.footprints)
     block = block_of(device)
     kernel = shade_reflectors_kernel(shadow.tracer, starts_rays, scene.features)
     inputs = [block, pixels, gbuffer.view, scene.records, scene.top_level, scene.lighting, scene.looks, shadow.views]

@@ -1,7 +1,5 @@
-"""How much of an object a pixel covers where its reflected ray passes: the *footprint* of the ray.
-
-A pixel's reflected ray and its neighbours' are some distance apart where they pass an object. That distance follows
-from the size of the reflection on the screen, the length of the ray, and the reflector's curvature.
+"""How much of an object a pixel covers where its reflected ray passes, by the rays' footprints
+(``geometry/footprint.py``), by which textures are filtered, too.
 
 The result depends on this frame alone: neither on earlier frames nor on the option ``skip``.
 """
@@ -13,10 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ldtrefl.frame.gbuffer import GBuffer
-from ldtrefl.frame.pixel_order import BLOCK
 from ldtrefl.frame.regions import Regions
 from ldtrefl.tracing.object_sets import entries, rays_of, run_count
-from ldtrefl.tracing.ray_buffers import RayBuffer, distance_across
+from ldtrefl.tracing.ray_buffers import RayBuffer
 from ldtrefl.world.device_object import DeviceObject
 
 FINEST = 5.0
@@ -42,20 +39,22 @@ class RayArrays:
     origin: np.ndarray
     direction: np.ndarray
     may_return: np.ndarray
+    footprint: np.ndarray
+    """(n,) structured: the fields of ``Footprint``."""
 
     @classmethod
     def of(cls, rays: RayBuffer) -> RayArrays:
-        """The arrays of a buffer."""
-        arrays = (rays.pixel, rays.source, rays.origin, rays.direction, rays.may_return)
+        """The arrays of a buffer whose rays carry their footprints."""
+        arrays = (rays.pixel, rays.source, rays.origin, rays.direction, rays.may_return, rays.footprint)
         return cls(*(array.numpy() for array in arrays))
 
 
-def footprint(rays: RayArrays, width: int, runs: np.ndarray, entry: DeviceObject) -> float | None:
-    """Distance between neighbouring pixels' rays at an object, device units; None if no two neighbours meet its sphere.
+def footprint(rays: RayArrays, spacing: float, runs: np.ndarray, entry: DeviceObject) -> float | None:
+    """Distance between neighbouring pixels' rays at an object, device units; None if no ray meets its sphere.
 
     Args:
         rays: all rays of one bounce.
-        width: pixels in a row of the image.
+        spacing: pixels that their footprints reach to.
         runs: (m,) numbers of the runs of rays that may meet the object.
     """
     pixel, source, origin, direction = rays.pixel, rays.source, rays.origin, rays.direction
@@ -70,16 +69,18 @@ def footprint(rays: RayArrays, width: int, runs: np.ndarray, entry: DeviceObject
     chosen = np.flatnonzero(meets)
     chosen = chosen[:: max(1, len(chosen) // SAMPLES)]
     numbers, along = numbers[chosen], along[chosen]
-    o, d = origin[numbers], direction[numbers].astype(float)
-    apart = np.full((2, len(numbers)), np.nan)
-    # In a block of pixels the next ray is that of the pixel to the right; a row of the block on, that of the one below.
-    for row, (step, to_pixel) in zip(apart, ((1, 1), (BLOCK, width)), strict=True):
-        beside = np.minimum(numbers + step, len(pixel) - 1)
-        pair = (pixel[beside] == pixel[numbers] + to_pixel) & (source[beside] == source[numbers])
-        row[pair] = distance_across(o, d, origin[beside], direction[beside], along)[pair]
-    both = np.sqrt(apart[0] * apart[1])
+    both = np.sqrt(_across(rays, numbers, along, "x") * _across(rays, numbers, along, "y")) / spacing
     both = both[np.isfinite(both) & (both > 0.0)]
     return float(np.percentile(both, FINEST)) if len(both) else None
+
+
+def _across(rays: RayArrays, numbers: np.ndarray, t: np.ndarray, axis: str) -> np.ndarray:
+    """(m,) how far the rays of these numbers are at ``t``, (m,), from their neighbours to the right (x) or below (y),
+    measured across them."""
+    footprints, direction = rays.footprint[numbers], rays.direction[numbers].astype(float)
+    gap = footprints[f"place_{axis}"] + t[:, None] * footprints[f"turn_{axis}"]
+    gap -= (gap * direction).sum(axis=1, keepdims=True) * direction
+    return np.asarray(np.linalg.norm(gap, axis=1))
 
 
 def pixel_spacing(gbuffer: GBuffer) -> float | None:
@@ -115,6 +116,6 @@ def finest_footprints(gbuffer: GBuffer, rays: RayBuffer, regions: Regions, *, is
         apart = [spacing]
         if is_shown:
             runs = listed_runs[listed_objects == entry.index] if are_listed else every_run
-            apart.append(footprint(arrays, gbuffer.camera.width, runs, entry))
+            apart.append(footprint(arrays, gbuffer.view.camera.spacing, runs, entry))
         finest[entry.index] = min((distance for distance in apart if distance is not None), default=None)
     return finest

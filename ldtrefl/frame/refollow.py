@@ -17,6 +17,7 @@ from ldtrefl.frame.bounces import FollowedRays, LaterBounce, RayFollower
 from ldtrefl.frame.history import Reusable
 from ldtrefl.frame.regions import Regions
 from ldtrefl.frame.taken_rays import taken
+from ldtrefl.geometry.footprint import is_same_footprint
 from ldtrefl.tracing.object_sets import RUN, ObjectSets, object_listed, rays_of, sets_for_runs
 from ldtrefl.tracing.ray_buffers import HitBuffer, RayBuffer, cloned, copy_hit
 
@@ -45,6 +46,8 @@ def find_changed_runs(
     while i < wp.min(RUN * run + RUN, rays.source.shape[0]) and not changed:
         same = rays.source[i] == before.source[i] and rays.origin[i] == before.origin[i]
         changed = not (same and rays.direction[i] == before.direction[i]) or source_onwards[i] >= 0
+        if rays.footprint.shape[0] > 0:
+            changed = changed or not is_same_footprint(rays.footprint[i], before.footprint[i])
         i += 1
     changed_out[run] = wp.where(changed, wp.uint8(1), wp.uint8(0))
 

@@ -10,9 +10,9 @@ import warp as wp
 from ldtrefl.device import launch
 from ldtrefl.device.bits import lowest_bit
 from ldtrefl.frame.gbuffer import GBuffer, GBufferView, sight
-from ldtrefl.shading.finish import Finish, finish_surface
+from ldtrefl.shading.finish import Finish, finishing
 from ldtrefl.shading.surface import Surface
-from ldtrefl.shading.surfaces import GROUP, Sighting, color_surface, look_from
+from ldtrefl.shading.surfaces import GROUP, Sighting, coloring, look_from
 from ldtrefl.tracing.tracer import block_of
 from ldtrefl.world.look_records import Looks
 from ldtrefl.world.records import LightingRecord, ObjectRecord
@@ -48,6 +48,7 @@ class SeenSurfaces:
 def describe_kernel(has_looks: bool) -> wp.Kernel:
     """The kernel that says what pixels see; ``has_looks`` if any object of the scene has a look."""
     with_looks = wp.constant(has_looks)
+    color_surface, finish_surface = coloring(0), finishing(0)
 
     @launch.kernel
     def describe(

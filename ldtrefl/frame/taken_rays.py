@@ -27,6 +27,6 @@ def taken(rays: RayBuffer, numbers: np.ndarray) -> RayBuffer:
     """The rays of these (m,) numbers, in their order."""
     device, count = rays.pixel.device, len(numbers)
     chosen = wp.array(numbers.astype(np.int32), dtype=wp.int32, device=device)
-    part = empty_rays(count, device)
+    part = empty_rays(count, device, carries_footprints=rays.footprint.shape[0] > 0)
     launch.launch(take_rays, count, [chosen, rays, part], device)
     return part

@@ -155,7 +155,7 @@ def resolved(drawing: Drawing, scene: DeviceScene) -> GBuffer:
     view = GBufferView()
     view.object, view.triangle = (wp.empty(pixels, dtype=wp.int32, device=device) for _ in range(2))
     view.reflector = wp.zeros(pixels, dtype=wp.uint8, device=device)
-    view.camera = camera_view(camera, scene.device_from_world, drawing.band)
+    view.camera = camera_view(camera, scene.device_from_world, drawing.band, scene.samples)
     drawn, places = _drawn_by_object(drawing, scene)
     run = PIXELS_IN_A_ROW if device.is_cpu else 1
     inputs = [

@@ -75,10 +75,27 @@ class CommonConfig:
         Annotated[bool, Field(strict=True)],
         Field(description="Whether a pixel that does not differ from its neighbours is sampled once."),
     ] = True
+    filter_textures: Annotated[
+        Annotated[bool, Field(strict=True)] | None,
+        Field(
+            description="Textures are shown as means over what pixels cover; if not given, where samples are several."
+        ),
+    ] = None
+    anisotropy: Annotated[
+        Annotated[int, Field(strict=True, ge=1, le=64)],
+        Field(description="How much longer than wide a filter of textures may be, 1 to 64: 1 is trilinear."),
+    ] = 16
 
     def sampling(self, scene: Scene) -> Sampling:
         """How often the pixels of a scene's image are sampled."""
         return Sampling(self.samples or scene.reflection.samples or DEFAULT_SAMPLES, self.adaptive)
+
+    def probes(self, scene: Scene) -> int:
+        """The most probes that a texture of a scene is filtered by; 0: it is not."""
+        filters = self.filter_textures
+        if filters is None:
+            filters = self.sampling(scene).samples > 1
+        return self.anisotropy if filters else 0
 
 
 @pydantic_dataclass(frozen=True, kw_only=True, config=CONFIG)
@@ -121,6 +138,11 @@ class Method(abc.ABC):
     def scene_tracer(cls, config: CommonConfig) -> SceneTracer:
         """The tracer that answers shadow rays, and the method's own rays if it has any; by default the ray caster."""
         return SceneBvh()
+
+    @classmethod
+    def needs_footprints(cls, config: CommonConfig) -> bool:
+        """Whether the method asks for the footprints of rays (``geometry/footprint.py``)."""
+        return False
 
     def place(self, scene: DeviceScene) -> None:
         """Go on with a scene in which some objects have moved, their meshes and all else the same."""

@@ -113,6 +113,12 @@ class Ldt(RayMethod):
         options = MapOptions(config.search, config.quality, config.linear_steps, config.binary_steps, config.resolution)
         return SceneMaps(options)
 
+    @classmethod
+    def needs_footprints(cls, config: CommonConfig) -> bool:
+        """Resolutions are chosen by footprints."""
+        assert isinstance(config, Ldt.Config)
+        return config.error is not None and config.resolution is None
+
     def place(self, scene: DeviceScene) -> None:
         """Go on with a scene in which some objects have moved."""
         super().place(scene)
@@ -211,7 +217,7 @@ class Ldt(RayMethod):
     @property
     def _chooses(self) -> bool:
         """Whether resolutions are chosen by what is seen."""
-        return self.config.error is not None and self.config.resolution is None
+        return self.needs_footprints(self.config)
 
     def _resolutions(self, gbuffer: GBuffer, rays: RayBuffer, regions: Regions) -> Mapping[DeviceMesh, int]:
         """The resolutions that the rays of a bounce and the shadows need; empty if all maps have the usual one."""

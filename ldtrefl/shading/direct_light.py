@@ -13,12 +13,12 @@ from typing import Any
 import warp as wp
 
 from ldtrefl.geometry.vectors import from_to
-from ldtrefl.shading.finish import Finish, finish_surface
+from ldtrefl.shading.finish import Finish, finishing
 from ldtrefl.shading.highlights import highlights
 from ldtrefl.shading.radiance_limit import SMALLEST_SQUARE, at_most_largest
 from ldtrefl.shading.soft_light import make_soft_light
 from ldtrefl.shading.surface import Surface
-from ldtrefl.shading.surfaces import Sighting, color_surface
+from ldtrefl.shading.surfaces import Sighting, coloring
 from ldtrefl.world.look_records import Looks
 from ldtrefl.world.records import LightingRecord, ObjectRecord
 from ldtrefl.world.shading_features import ShadingFeatures
@@ -92,6 +92,7 @@ def make_shaded(share_lit: Callable[..., float], features: ShadingFeatures) -> C
     ``pixel`` is the column and the row in the image whose samples of lights are taken.
     """
     direct_radiance = make_direct_radiance(share_lit, features)
+    color_surface, finish_surface = coloring(features.probes), finishing(features.probes)
 
     @wp.func
     def shaded_without_looks(

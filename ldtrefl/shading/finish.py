@@ -8,12 +8,15 @@ winding, and light does not come in through walls whose outsides are not modelle
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import warp as wp
 
+from ldtrefl.device import launch
 from ldtrefl.device.native_sources import native_body
 from ldtrefl.shading.surface import Surface, part_of
 from ldtrefl.shading.surfaces import Sighting
+from ldtrefl.shading.textures import PICTURE_CONSTANTS
 from ldtrefl.world import look_records
 from ldtrefl.world.environment_frame import NEAR_X
 from ldtrefl.world.look_records import Looks
@@ -23,13 +26,6 @@ from ldtrefl.world.reflectance_table import ROWS as TABLE_ROWS
 
 LEAST_TILT = 0.01
 """The least cosine of a mapped normal with the facet's, and with the way to the viewer."""
-
-FARTHEST = 1.0e6
-"""Texture coordinates beyond this count as this: float32 tells no texels apart there."""
-
-BYTE = 1.0 / 255.0
-"""What the smallest step of a byte is worth."""
-
 
 LEAST_SHARE = 1.0e-3
 """The least share that microfacets are taken to reflect in all, which is divided by."""
@@ -62,16 +58,14 @@ class Finish:
 
 
 LOOK_CONSTANTS = (
-    *("MASK", "BLEND", "REPEAT", "CLAMP", "MIRROR", "LINEAR_FLOATS", "SRGB_BYTES"),
-    *("SLOTS", "BASE", "METALLIC_ROUGHNESS", "NORMAL", "OCCLUSION", "EMISSION"),
+    *("MASK", "BLEND", "SLOTS", "BASE", "METALLIC_ROUGHNESS", "NORMAL", "OCCLUSION", "EMISSION"),
     *("SPECULAR", "SPECULAR_COLOR", "CLEARCOAT", "CLEARCOAT_ROUGHNESS"),
 )
 """Constants of ``look_records.py`` that the C++ uses."""
 
 CONSTANTS: dict[str, float | int] = {
     "LEAST_TILT": LEAST_TILT,
-    "FARTHEST": FARTHEST,
-    "BYTE": BYTE,
+    **PICTURE_CONSTANTS,
     "LEAST_SHARE": LEAST_SHARE,
     "LEAST_ROUGHNESS": LEAST_ROUGHNESS,
     "COAT": COAT,
@@ -81,7 +75,7 @@ CONSTANTS: dict[str, float | int] = {
     "TABLE_COLUMNS": TABLE_COLUMNS,
     **{name: getattr(look_records, name) for name in LOOK_CONSTANTS},
 }
-FILES = ("shading/finish.h",)
+FILES = ("shading/pictures.h", "shading/finish.h")
 
 READ = """
 using Three = Finishes::Three;
@@ -115,6 +109,9 @@ const auto picture_of = [&](int number) {
     made.floats = (const float*)look.texels.data + 3LL * of.first;
     made.bytes = (const unsigned char*)look.texel_bytes.data + 3LL * of.first;
     made.alpha = of.first_alpha < 0 ? nullptr : look.texel_alpha.data + of.first_alpha;
+    made.mip_floats = (const float*)look.mip_texels.data + 3LL * of.first_mip;
+    made.mip_bytes = (const unsigned char*)look.mip_bytes.data + 3LL * of.first_mip;
+    made.mip_alpha = look.mip_alpha.data + of.first_mip_alpha;
     made.decoded = looks.decoded.data;
     return made;
 };
@@ -137,7 +134,18 @@ for (int slot = 0; slot < SLOTS; ++slot) {
     uvs_of(number, uv);
     const float u = weight[0] * uv[0] + weight[1] * uv[2] + weight[2] * uv[4];
     const float v = weight[0] * uv[1] + weight[1] * uv[3] + weight[2] * uv[5];
-    texels[slot] = Finishes::sample(picture_of(number), u, v);
+    if (!IS_FILTERED) {
+        texels[slot] = Finishes::sample(picture_of(number), u, v);
+        continue;
+    }
+    float change[4];
+    for (int i = 0; i < 4; ++i) {
+        const int axis = i / 2 * 2, c = i % 2;
+        change[i] = sighting.spread[axis] * (uv[2 + c] - uv[c]) + sighting.spread[axis + 1] * (uv[4 + c] - uv[c]);
+    }
+    texels[slot] = Finishes::mean_over(picture_of(number), u, v, change);
+    if (slot == BASE && material.alpha_mode == MASK)  // of a mean, what is small would be cut away
+        texels[slot].w = Finishes::sample(picture_of(number), u, v).w;
 }
 Three base = Finishes::product(three(material.base), color_of(texels[BASE]));
 float alpha = material.alpha * texels[BASE].w;
@@ -271,21 +279,6 @@ surface.goes_through = layers.goes_through;
 """
 
 
-@wp.func_native(native_body(CONSTANTS, FILES, READ + PICTURE + TEXTURES + BEND + LAY + HAZE + STORE))
-def finish_part(
-    objects: wp.array(dtype=ObjectRecord),
-    looks: Looks,
-    lighting: LightingRecord,
-    part: int,
-    sightings: wp.array(dtype=Sighting),
-    lane: int,
-    surfaces: wp.array(dtype=Surface),
-    finishes: wp.array(dtype=Finish),
-):
-    """Set the colours and the normal of a lane's surface, on a part of an object with a look; and the first finish."""
-    ...
-
-
 FIND = """
 const auto& record = objects.data[k];
 const auto& look = looks.records.data[record.look];
@@ -315,7 +308,7 @@ return Finishes::covered(material.alpha_mode, material.alpha_cutoff, alpha);
 """
 
 
-@wp.func_native(native_body(CONSTANTS, FILES, FIND + PICTURE + COVER))
+@wp.func_native(native_body(CONSTANTS | {"MOST_PROBES": 1}, FILES, FIND + PICTURE + COVER))
 def coverage_of_part(
     objects: wp.array(dtype=ObjectRecord), looks: Looks, k: int, part: int, triangle: int, u: float, v: float
 ) -> wp.float32:
@@ -323,18 +316,42 @@ def coverage_of_part(
     ...
 
 
-@wp.func
-def finish_surface(
-    objects: wp.array(dtype=ObjectRecord),
-    looks: Looks,
-    lighting: LightingRecord,
-    sightings: wp.array(dtype=Sighting),
-    lane: int,
-    surfaces: wp.array(dtype=Surface),
-    finishes: wp.array(dtype=Finish),
-):
-    """Set the colours, the reflectance and the normal of a lane's surface that has a look; and the first finish, which
-    is what else shading needs of it. The surface's normal is then that which rays are mirrored at; what it shows of the
-    environment in place of rays is added to its emission."""
-    part = part_of(objects, sightings[lane].object, sightings[lane].triangle)
-    finish_part(objects, looks, lighting, part, sightings, lane, surfaces, finishes)
+@launch.once
+def finishing(probes: int) -> Callable[..., None]:
+    """``finish_surface(objects, looks, lighting, sightings, lane, surfaces, finishes)``: set the colours, the
+    reflectance and the normal of a lane's surface that has a look; and the first finish, which is what else shading
+    needs of it. The surface's normal is then that which rays are mirrored at; what it shows of the environment in place
+    of rays is added to its emission.
+
+    Textures are read at its point, or with ``probes`` above 0 over its spread, in so many probes at most.
+    """
+    constants = CONSTANTS | {"IS_FILTERED": probes > 0, "MOST_PROBES": max(probes, 1)}
+
+    @wp.func_native(native_body(constants, FILES, READ + PICTURE + TEXTURES + BEND + LAY + HAZE + STORE))
+    def finish_part(
+        objects: wp.array(dtype=ObjectRecord),
+        looks: Looks,
+        lighting: LightingRecord,
+        part: int,
+        sightings: wp.array(dtype=Sighting),
+        lane: int,
+        surfaces: wp.array(dtype=Surface),
+        finishes: wp.array(dtype=Finish),
+    ):
+        """Do so for a part of the object."""
+        ...
+
+    @wp.func
+    def finish_surface(
+        objects: wp.array(dtype=ObjectRecord),
+        looks: Looks,
+        lighting: LightingRecord,
+        sightings: wp.array(dtype=Sighting),
+        lane: int,
+        surfaces: wp.array(dtype=Surface),
+        finishes: wp.array(dtype=Finish),
+    ):
+        part = part_of(objects, sightings[lane].object, sightings[lane].triangle)
+        finish_part(objects, looks, lighting, part, sightings, lane, surfaces, finishes)
+
+    return finish_surface

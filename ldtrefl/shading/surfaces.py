@@ -6,12 +6,16 @@ found in vectors: on the CPU eight rays at a time, on CUDA one. ``surface.py`` s
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import warp as wp
 
+from ldtrefl.device import launch
 from ldtrefl.device.bits import lowest_bit
 from ldtrefl.device.native_sources import native_body
 from ldtrefl.shading.specular import schlick
-from ldtrefl.shading.surface import Surface, albedo_at
+from ldtrefl.shading.surface import Surface, albedo_at, part_of
+from ldtrefl.shading.textures import texture_mean
 from ldtrefl.world.records import ObjectRecord
 
 GROUP = wp.constant(8)
@@ -31,6 +35,7 @@ class Sighting:
     v: float
     view: wp.vec3  # unit; 0 if the eye touches the point
     way: wp.vec3d  # the same of any length, for what is looked at from an eye
+    spread: wp.vec4  # by which barycentrics change to the next pixel: u and v to the right, then below; if followed
 
 
 CONSTANTS: dict[str, float | int] = {"SMALLEST_NORMAL": SMALLEST_NORMAL}
@@ -178,18 +183,35 @@ def look_along(
         left = left & ~same
 
 
-@wp.func
-def color_surface(
-    objects: wp.array(dtype=ObjectRecord),
-    sightings: wp.array(dtype=Sighting),
-    lane: int,
-    surfaces: wp.array(dtype=Surface),
-):
-    """Set those colours of a lane's surface that are not the same on all of its object."""
-    index = sightings[lane].object
-    if objects[index].part_first.shape[0] > 1 or objects[index].part_texture[0][1] > 0:
-        u, v = sightings[lane].u, sightings[lane].v
-        surfaces[lane].albedo = albedo_at(objects, index, sightings[lane].triangle, u, v)
-    if objects[index].fresnel != 0:
-        cosine = -wp.dot(surfaces[lane].normal, sightings[lane].view)
-        surfaces[lane].mirror = schlick(objects[index].mirror, cosine)
+@launch.once
+def coloring(probes: int) -> Callable[..., None]:
+    """``color_surface(objects, sightings, lane, surfaces)``: set those colours of a lane's surface that are not the
+    same on all of its object. Textures are read at its point, or with ``probes`` above 0 over its spread."""
+    filters = wp.constant(probes > 0)
+    mean_of_texture = texture_mean(max(probes, 1))
+
+    @wp.func
+    def color_surface(
+        objects: wp.array(dtype=ObjectRecord),
+        sightings: wp.array(dtype=Sighting),
+        lane: int,
+        surfaces: wp.array(dtype=Surface),
+    ):
+        index = sightings[lane].object
+        if objects[index].part_first.shape[0] > 1 or objects[index].part_texture[0][1] > 0:
+            u, v, triangle = sightings[lane].u, sightings[lane].v, sightings[lane].triangle
+            if filters:
+                part = part_of(objects, index, triangle)
+                color = wp.cw_mul(objects[index].albedo, objects[index].part_color[part])
+                if objects[index].part_texture[part][1] > 0:
+                    spread = sightings[lane].spread
+                    mean = mean_of_texture(objects, index, part, triangle, u, v, spread)
+                    color = wp.cw_mul(color, mean)
+                surfaces[lane].albedo = color
+            else:
+                surfaces[lane].albedo = albedo_at(objects, index, triangle, u, v)
+        if objects[index].fresnel != 0:
+            cosine = -wp.dot(surfaces[lane].normal, sightings[lane].view)
+            surfaces[lane].mirror = schlick(objects[index].mirror, cosine)
+
+    return color_surface

@@ -13,6 +13,7 @@ from typing import TypeVar
 import numpy as np
 import warp as wp
 
+from ldtrefl.geometry.footprint import Footprint
 from ldtrefl.tracing.hit import Hit
 
 Buffer = TypeVar("Buffer")
@@ -29,6 +30,7 @@ class RayBuffer:
     source: wp.array(dtype=wp.int32)  # the object that it leaves
     source_triangle: wp.array(dtype=wp.int32)  # and the triangle of that object
     may_return: wp.array(dtype=wp.uint8)  # 1 if it may meet that object, too
+    footprint: wp.array(dtype=Footprint)  # where it starts; empty if nothing asks for footprints
 
 
 @wp.struct
@@ -110,15 +112,18 @@ def copy_ray(rays: RayBuffer, i: int, rays_out: RayBuffer, k: int):
     rays_out.source[k] = rays.source[i]
     rays_out.source_triangle[k] = rays.source_triangle[i]
     rays_out.may_return[k] = rays.may_return[i]
+    if rays.footprint.shape[0] > 0:
+        rays_out.footprint[k] = rays.footprint[i]
 
 
-def empty_rays(count: int, device: wp.Device) -> RayBuffer:
+def empty_rays(count: int, device: wp.Device, *, carries_footprints: bool = False) -> RayBuffer:
     """A buffer for so many rays, not filled yet."""
     rays = RayBuffer()
     rays.pixel, rays.source, rays.source_triangle = (wp.empty(count, dtype=wp.int32, device=device) for _ in range(3))
     rays.origin = wp.empty(count, dtype=wp.vec3d, device=device)
     rays.direction, rays.throughput = (wp.empty(count, dtype=wp.vec3, device=device) for _ in range(2))
     rays.may_return = wp.empty(count, dtype=wp.uint8, device=device)
+    rays.footprint = wp.empty(count if carries_footprints else 0, dtype=Footprint, device=device)
     return rays
 
 

@@ -15,7 +15,12 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
+from ldtrefl.geometry.footprint import Footprint
 from ldtrefl.scene.description import Camera
+
+BLENDED = 0.6
+"""How far the footprints of several rays of a pixel reach, over the distance between these. Measured
+(``tools/texture_filtering.py``): with 1 textures lose a tenth of their finest detail, with 0.4 they flicker."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +47,7 @@ class CameraView:
     width: int
     height: int  # of the whole image
     first_row: int  # of the band
+    spacing: float  # pixels from a ray to its neighbours, which its footprint reaches to
 
 
 @wp.func
@@ -58,6 +64,24 @@ def pixel_place(camera: CameraView, pixel: int) -> wp.vec2i:
     """Column and row in the whole image of a pixel of the band."""
     row = pixel / camera.width
     return wp.vec2i(pixel - row * camera.width, row + camera.first_row)
+
+
+@wp.func
+def turned_by(way: wp.vec3d, change: wp.vec3d) -> wp.vec3:
+    """From the unit direction along ``way`` to that along ``way + change``, to first order."""
+    along = wp.normalize(way)
+    turn = (change - wp.dot(change, along) * along) / wp.length(way)
+    return wp.vec3(float(turn[0]), float(turn[1]), float(turn[2]))
+
+
+@wp.func
+def camera_footprint(camera: CameraView, way: wp.vec3d) -> Footprint:
+    """The footprint at the eye of the ray along ``way``, as :func:`camera_ray` gives it (Igehy 1999, equation 8)."""
+    footprint = Footprint()
+    reach = wp.float64(2.0 * camera.spacing)
+    footprint.turn_x = turned_by(way, (reach / wp.float64(camera.width)) * camera.right)
+    footprint.turn_y = turned_by(way, (reach / wp.float64(camera.height)) * camera.down)
+    return footprint
 
 
 @functools.lru_cache(maxsize=1)
@@ -77,8 +101,15 @@ def unit_up(camera: Camera) -> np.ndarray:
     return up / np.linalg.norm(up)
 
 
-def camera_view(camera: Camera, device_from_world: np.ndarray, band: Band) -> CameraView:
-    """The camera in device space, which is the world moved and scaled alike along all axes."""
+def ray_spacing(samples: int) -> float:
+    """Pixels from a ray to its neighbours, for so many rays a pixel. Of many, each reaches less far than to the next:
+    they are blended as well, and more would blur twice."""
+    return 1.0 if samples == 1 else float(BLENDED / np.sqrt(samples))
+
+
+def camera_view(camera: Camera, device_from_world: np.ndarray, band: Band, samples: int = 1) -> CameraView:
+    """The camera in device space, which is the world moved and scaled alike along all axes; ``samples`` is how many
+    rays a pixel has."""
     right, down, forward = camera_axes(camera)
     half_height = np.tan(np.radians(camera.fov_y) / 2.0)
     view = CameraView()
@@ -87,6 +118,7 @@ def camera_view(camera: Camera, device_from_world: np.ndarray, band: Band) -> Ca
     view.down = wp.vec3d(*(down * half_height))
     view.forward = wp.vec3d(*forward)
     view.width, view.height, view.first_row = camera.width, camera.height, band.first_row
+    view.spacing = ray_spacing(samples)
     return view
 
 

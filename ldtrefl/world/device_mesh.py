@@ -25,8 +25,10 @@ class DeviceMesh:
     """A mesh's arrays on a device. Normals, texture coordinates and textures, which only shading needs, are uploaded
     when they are first asked for. On the CPU all arrays are the mesh's own memory, which nobody writes."""
 
-    def __init__(self, mesh: Mesh, device: wp.Device) -> None:
+    def __init__(self, mesh: Mesh, device: wp.Device, *, filters: bool = False) -> None:
+        """Upload the vertices and faces of a mesh; with ``filters``, textures will have their mip maps."""
         self.mesh = mesh
+        self._filters = filters
         self.vertices = wp.array(mesh.unit_vertices, dtype=wp.vec3, device=device, copy=False)
         self.faces = wp.array(mesh.faces, dtype=wp.vec3i, device=device, copy=False)
         self.attribute_bytes = 0
@@ -112,7 +114,7 @@ class DeviceMesh:
             arrays, device = dict(self._look_arrays), self.vertices.device
             if hides_backs(self.mesh, owns):
                 arrays["has_image"] = self._has_image
-            self._looks[key] = look_of(self.mesh, owns, reflection, arrays, device)
+            self._looks[key] = look_of(self.mesh, owns, reflection, arrays, device, filters=self._filters)
         return self._looks[key]
 
     @functools.cached_property
@@ -124,6 +126,12 @@ class DeviceMesh:
             missing = np.zeros((0, width), np.float32)
             arrays[name] = self._attribute(missing if values is None else values, dtype)
         return arrays
+
+    @property
+    def has_textures(self) -> bool:
+        """Whether any object with this mesh, of those uploaded so far, has a texture."""
+        looks, appearances = self._looks.values(), self._appearances.values()
+        return any(look.has_textures for look in looks) or any(plain.has_textures for plain in appearances)
 
     @functools.cached_property
     def _has_image(self) -> wp.array:
@@ -153,5 +161,5 @@ class DeviceMesh:
         Objects with the same mesh and texture share one."""
         key = None if texture is None else texture.key
         if key not in self._appearances:
-            self._appearances[key] = appearance_of(self.mesh, texture, self.vertices.device)
+            self._appearances[key] = appearance_of(self.mesh, texture, self.vertices.device, filters=self._filters)
         return self._appearances[key]

@@ -11,6 +11,7 @@ from __future__ import annotations
 import functools
 import itertools
 import operator
+from dataclasses import dataclass
 
 import numpy as np
 import warp as wp
@@ -35,6 +36,23 @@ from ldtrefl.world.top_level import TopLevel, order_of, top_level
 from ldtrefl.world.triangle_numbers import MOST_NUMBERS, TriangleNumbers, numbered
 
 
+@dataclass(frozen=True)
+class Uploads:
+    """What a scene on a device has for shading and for its rays."""
+
+    skip_attributes: bool = True
+    """Normals and texture coordinates that shading does not read are left out."""
+    probes: int = 0
+    """The most probes that a texture is filtered by (``shading/textures.py``); 0: textures are not filtered."""
+    needs_footprints: bool = False
+    """Rays carry their footprints in any case."""
+    samples: int = 1
+    """Rays of a pixel, at most."""
+
+
+USUAL_UPLOADS = Uploads()
+
+
 class DeviceScene:
     """A scene on a device.
 
@@ -44,18 +62,18 @@ class DeviceScene:
         before: a scene on the same device from which ``scene`` was made by changing objects
             (:meth:`Scene.with_object`). Meshes, the environment's picture and objects that stand where they stood are
             taken over from it.
-        skip_attributes: leave out normals and texture coordinates that shading does not read.
+        uploads: what is uploaded for shading.
 
     Raises:
         InputError: a mesh, texture or picture cannot be read, or there are too many texels.
     """
 
     def __init__(
-        self, scene: Scene, device: wp.Device, before: DeviceScene | None = None, *, skip_attributes: bool = True
+        self, scene: Scene, device: wp.Device, before: DeviceScene | None = None, *, uploads: Uploads = USUAL_UPLOADS
     ) -> None:
         self.scene = scene
         self.device = device
-        self._skip_attributes = skip_attributes
+        self._uploads = uploads
         self._top_order: np.ndarray | None = None if before is None else before._top_order
         decoded = wp.array(linear_of_bytes(), dtype=float, device=device, copy=False)
         self._decoded: wp.array = decoded if before is None else before._decoded  # records that are taken over read it
@@ -81,7 +99,7 @@ class DeviceScene:
         known = {} if before is None else {mesh.mesh.key: mesh for mesh in before.meshes}
         for mesh in layout.meshes:
             if mesh.key not in known:
-                known[mesh.key] = DeviceMesh(mesh, self.device)
+                known[mesh.key] = DeviceMesh(mesh, self.device, filters=self._uploads.probes > 0)
         meshes = [known[mesh.key] for mesh in layout.meshes]
         numbers = {mesh: number for number, mesh in enumerate(dict.fromkeys(meshes))}
         self.meshes: list[DeviceMesh] = list(numbers)
@@ -134,7 +152,7 @@ class DeviceScene:
         """Fill in all but the places of the objects of these numbers."""
         records, sources = self._rows(numbers), [self.scene.objects[number] for number in numbers]
         known = [self.meshes, self.mesh_of[numbers], self._decoded, self._looks]
-        fill_records(records, sources, *known, skip_attributes=self._skip_attributes)
+        fill_records(records, sources, *known, skip_attributes=self._uploads.skip_attributes)
         self._put_back(records, numbers)
 
     def _rows(self, numbers: np.ndarray) -> np.ndarray:
@@ -176,6 +194,7 @@ class DeviceScene:
     @functools.cached_property
     def features(self) -> ShadingFeatures:
         """What kernels are built for."""
+        probes = self._uploads.probes if any(mesh.has_textures for mesh in self.meshes) else 0
         lighting, shaped = self.scene.lighting, [light for light in self.scene.lights if light.kind in SHAPED]
         return ShadingFeatures(
             looks=bool((self._records["look"] >= 0).any()),
@@ -184,7 +203,14 @@ class DeviceScene:
             occlusion=lighting.occlusion is not None,
             shaped_lights=bool(shaped),
             visible_lights=any(light.visible and light.kind != "spot" for light in shaped),
+            probes=probes,
+            footprints=self._uploads.needs_footprints or probes > 0,
         )
+
+    @property
+    def samples(self) -> int:
+        """Rays of a pixel, at most: their footprints reach less far the more they are."""
+        return self._uploads.samples
 
     @functools.cached_property
     def is_reflector(self) -> np.ndarray:

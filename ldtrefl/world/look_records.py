@@ -46,6 +46,8 @@ class TextureRecord:
     height: int
     stored: int  # LINEAR_FLOATS, SRGB_BYTES or FRACTION_BYTES
     first_alpha: int  # the alpha of its first texel; -1 if it is opaque
+    first_mip: int  # the first texel of its mip maps, if it is filtered
+    first_mip_alpha: int  # and the alpha of that
     uv_set: int
     wrap: wp.vec2i  # along u and v
     is_nearest: int
@@ -95,6 +97,9 @@ class LookRecord:
     texels: wp.array(dtype=wp.vec3)  # of pictures of floats, linear
     texel_bytes: wp.array(dtype=wp.vec3ub)  # of pictures of 8 bits
     texel_alpha: wp.array(dtype=wp.uint8)
+    mip_texels: wp.array(dtype=wp.vec3)  # the mip maps of all three; empty if nothing is filtered
+    mip_bytes: wp.array(dtype=wp.vec3ub)
+    mip_alpha: wp.array(dtype=wp.uint8)
     has_image: wp.array(dtype=wp.uint8)  # of each triangle, where backs are hidden: 1 if its back stands for the front
     # of another one, which lies in the same place the other way round; empty if none does
     lets_through: int  # 1 if some part lets light through by its alpha

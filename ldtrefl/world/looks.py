@@ -84,6 +84,8 @@ class Look:
     """Whether some part lets light through by its alpha."""
     shines: bool
     """Whether some part reflects anything at all."""
+    has_textures: bool
+    """Whether any part has a texture."""
 
 
 def look_of(
@@ -92,6 +94,8 @@ def look_of(
     reflection: Reflection,
     arrays: dict[str, wp.array],
     device: wp.Device,
+    *,
+    filters: bool = False,
 ) -> Look:
     """The look of an object.
 
@@ -101,13 +105,14 @@ def look_of(
         reflection: from when on rays are sent.
         arrays: those of the mesh, by the names of the fields.
         device: where it is read.
+        filters: textures have their mip maps.
 
     Raises:
         InputError: the scene gives a texture, and the mesh has no texture coordinates.
     """
     if any(own.texture is not None for own in owns) and mesh.uvs is None:
         raise InputError("material.texture: the object has no texture coordinates (UVs)")
-    look, pool, is_of_file = LookRecord(), TexturePool(), has_material(mesh)
+    look, pool, is_of_file = LookRecord(), TexturePool(filters=filters), has_material(mesh)
     pairs = zip(mesh.parts, owns, strict=True)
     looks = [overridden(part.material, own, is_of_file=is_of_file) for part, own in pairs]
     uv_sets = [mesh.uvs is not None, mesh.second_uvs is not None]
@@ -124,7 +129,7 @@ def look_of(
     lets_through = any(material.alpha_mode != "opaque" for material in looks)
     look.lets_through = int(lets_through)
     reflects = any(record.reflects or record.hides_back for record in records)
-    return Look(look, reflects, lets_through, shines)
+    return Look(look, reflects, lets_through, shines, look.textures.shape[0] > 0)
 
 
 def is_mirror(entry: Object, reflection: Reflection) -> bool:

@@ -144,5 +144,6 @@ def _shared_record(
     record.uvs = mesh.uvs if look.has_textures or not skip_attributes else mesh.no_uvs
     record.part_first, record.part_color = look.part_first, look.part_color
     record.part_texture, record.texels, record.texel_bytes = look.part_texture, look.texels, look.texel_bytes
+    record.part_mips, record.mip_texels, record.mip_bytes = look.part_mips, look.mip_texels, look.mip_bytes
     record.decoded = decoded
     return record

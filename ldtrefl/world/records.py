@@ -38,6 +38,9 @@ class ObjectRecord:
     part_texture: wp.array(dtype=wp.vec4i)  # first texel, width, height, 1 for bytes; width 0 without a texture
     texels: wp.array(dtype=wp.vec3)  # all parts' textures of floats, linear, row 0 at v = 1
     texel_bytes: wp.array(dtype=wp.vec3ub)  # all parts' textures of 8 bits, sRGB, row 0 at v = 1
+    part_mips: wp.array(dtype=wp.int32)  # first texel of the mip maps of each part's texture; empty if not filtered
+    mip_texels: wp.array(dtype=wp.vec3)  # the mip maps of textures of floats
+    mip_bytes: wp.array(dtype=wp.vec3ub)  # and of those of 8 bits
     decoded: wp.array(dtype=float)  # the linear value of every byte
     reflects: int  # 1 if rays leave all of its surface, 2 if they may leave some parts by its look, 0 if none do
     look: int  # its number among the scene's looks; -1 if colours, textures and mirror above are all

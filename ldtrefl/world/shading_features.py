@@ -22,6 +22,11 @@ class ShadingFeatures:
     visible_lights: bool = False
     """Whether the shapes of any are seen."""
 
+    probes: int = 0
+    """The most probes by which a texture is filtered; 0: textures are not filtered, or there are none."""
+    footprints: bool = False
+    """Whether rays carry their footprints."""
+
     @property
     def soft_light(self) -> bool:
         """Whether any light may need several rays from each point."""

@@ -32,6 +32,8 @@ FEATURES = (
     ShadingFeatures(looks=True, shadows=True, dimmed_shadows=True),
     ShadingFeatures(shaped_lights=True, visible_lights=True),
     ShadingFeatures(*[True] * 6),
+    ShadingFeatures(probes=16, footprints=True),
+    ShadingFeatures(*[True] * 6, probes=16, footprints=True),
 )
 """What scenes may have."""
 

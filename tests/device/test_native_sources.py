@@ -19,7 +19,7 @@ from ldtrefl.ldt.exact.tree import TreeView
 from ldtrefl.ldt.exact.walk import CONSTANTS, FILES, SEARCH, TREE
 from ldtrefl.ldt.linear import march
 from ldtrefl.scene import shapes
-from ldtrefl.shading import finish, highlights, surfaces
+from ldtrefl.shading import finish, highlights, surfaces, textures
 from ldtrefl.tracing import bvh_walk
 from ldtrefl.tracing.batch import trace_batch
 from ldtrefl.tracing.hit import Hit
@@ -49,7 +49,8 @@ SOURCES = {
     "device/cpu_threads.h": (cpu_threads.CONSTANTS, ()),
     "device/vectors.h": ({}, ()),
     "frame/backdrop.h": ({}, ("device/vectors.h",)),
-    "shading/finish.h": (finish.CONSTANTS, ()),
+    "shading/finish.h": (finish.CONSTANTS | {"MOST_PROBES": 16}, finish.FILES[:-1]),
+    "shading/pictures.h": (textures.PICTURE_CONSTANTS | {"MOST_PROBES": 16}, ()),
     "shading/highlights.h": (highlights.CONSTANTS, ()),
     "shading/surfaces.h": (surfaces.CONSTANTS, ("device/vectors.h",)),
     "frame/run_rays.h": (run_rays.CONSTANTS, ("device/vectors.h",)),

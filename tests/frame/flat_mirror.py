@@ -23,7 +23,7 @@ from ldtrefl.tracing.ray_buffers import RayBuffer
 from ldtrefl.tracing.scene_bvh import SceneBvh
 from ldtrefl.tracing.tracer import BoundTracer
 from ldtrefl.world.camera import camera_axes
-from ldtrefl.world.device_scene import DeviceScene
+from ldtrefl.world.device_scene import DeviceScene, Uploads
 
 CAMERA = Camera(eye=(0.3, -4.0, 3.0), look_at=(0.0, 0.0, 0.0), width=75, height=52, fov_y=50.0)
 GROUND, BOX = 0, 1
@@ -59,8 +59,9 @@ def scene(place: tuple[float, float, float] = (0.1, 0.5, 1.2), box_mirror: float
     return Scene(**{**given, **changes})
 
 
-def on_device(given: Scene, before: DeviceScene | None = None) -> DeviceScene:
-    return DeviceScene(given, launch.resolve_device(None), before)
+def on_device(given: Scene, before: DeviceScene | None = None, *, needs_footprints: bool = False) -> DeviceScene:
+    uploads = Uploads(needs_footprints=needs_footprints)
+    return DeviceScene(given, launch.resolve_device(None), before, uploads=uploads)
 
 
 def seen_and_shaded(device_scene: DeviceScene) -> tuple[GBuffer, Shaded]:

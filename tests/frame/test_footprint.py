@@ -40,10 +40,10 @@ def above(mirror: str, **params: object) -> Scene:
     ids=["flat", "convex"],
 )
 def test_neighbouring_rays_are_as_far_apart_as_geometry_says(given: Scene, expected: float) -> None:
-    scene = flat_mirror.on_device(given)
+    scene = flat_mirror.on_device(given, needs_footprints=True)
     gbuffer, shaded = flat_mirror.seen_and_shaded(scene)
     ball, runs = scene.objects[1], np.arange(run_count(shaded.rays.pixel.shape[0]))
-    found = footprint(RayArrays.of(shaded.rays), SIDE, runs, ball)
+    found = footprint(RayArrays.of(shaded.rays), 1.0, runs, ball)
     assert found is not None
     assert found / scene.device_units_per_world_unit == pytest.approx(expected, rel=0.01)
     regions = safe_regions(gbuffer, shaded.rays, 0, Stats())
@@ -51,7 +51,7 @@ def test_neighbouring_rays_are_as_far_apart_as_geometry_says(given: Scene, expec
 
 
 def test_pixels_on_what_the_camera_sees() -> None:
-    scene = flat_mirror.on_device(above("plane"))
+    scene = flat_mirror.on_device(above("plane"), needs_footprints=True)
     gbuffer, shaded = flat_mirror.seen_and_shaded(scene)
     spacing = pixel_spacing(gbuffer)
     assert spacing is not None and spacing / scene.device_units_per_world_unit == pytest.approx(EYE * PIXEL, rel=1e-6)
@@ -64,9 +64,11 @@ def test_nothing_is_known_where_nothing_is_met() -> None:
     """Rays go up; the ball stands below the mirror, and the camera may look away from all."""
     given = above("plane")
     below = Object(shape="sphere", translate=(0, 0, -9))
-    scene = flat_mirror.on_device(dataclasses.replace(given, objects=(given.objects[0], below)))
+    scene = flat_mirror.on_device(dataclasses.replace(given, objects=(given.objects[0], below)), needs_footprints=True)
     gbuffer, shaded = flat_mirror.seen_and_shaded(scene)
     assert finest_footprints(gbuffer, shaded.rays, all_objects(scene, shaded.rays), is_seen=False) == {1: None}
     away = Camera(eye=(0, 0, EYE), look_at=(0, 0, 9), up=(0, 1, 0), width=8, height=8)
-    nothing, shaded = flat_mirror.seen_and_shaded(flat_mirror.on_device(scene.scene.with_camera(away)))
+    nothing, shaded = flat_mirror.seen_and_shaded(
+        flat_mirror.on_device(scene.scene.with_camera(away), needs_footprints=True)
+    )
     assert pixel_spacing(nothing) is None

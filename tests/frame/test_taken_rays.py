@@ -8,7 +8,7 @@ from ldtrefl.tracing.ray_buffers import RayBuffer, empty_rays
 
 
 def test_every_field_of_the_rays_is_taken_in_the_order_of_the_numbers() -> None:
-    rng, rays = np.random.default_rng(0), empty_rays(500, launch.resolve_device(None))
+    rng, rays = np.random.default_rng(0), empty_rays(500, launch.resolve_device(None), carries_footprints=True)
     numbers = rng.permutation(500)[:90]
     for name in RayBuffer.vars:
         array = getattr(rays, name)

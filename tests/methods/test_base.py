@@ -122,10 +122,8 @@ def test_wrong_options_are_refused_in_one_line(options: dict[str, object], line:
 def test_what_a_method_says_of_itself() -> None:
     assert PaintedNormal.describe() == "The normal of the reflector as a colour."
     options = PaintedNormal.options()
-    assert list(options) == ["skip", "samples", "adaptive", "gain"] and options["gain"] == (
-        1.0,
-        "What the colour is multiplied by.",
-    )
+    assert list(options) == ["skip", "samples", "adaptive", "filter_textures", "anisotropy", "gain"]
+    assert options["gain"] == (1.0, "What the colour is multiplied by.")
     default, words = options["skip"]
     assert default == "all" and all(name in words for name in skip_names())
     assert PaintedNormal.configured({}).gain == 1.0 and PaintedNormal.configured({"gain": 3}).gain == 3.0

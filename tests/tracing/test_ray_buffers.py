@@ -2,6 +2,7 @@
 
 import numpy as np
 import warp as wp
+from numpy.lib.recfunctions import structured_to_unstructured
 
 from ldtrefl.device import launch
 from ldtrefl.tracing.hit import Hit
@@ -64,7 +65,7 @@ def test_the_nearest_hit_is_kept_and_of_two_in_one_place_the_first_object() -> N
 
 def some_rays(count: int, seed: int) -> RayBuffer:
     """Rays of random numbers."""
-    rng, rays = np.random.default_rng(seed), empty_rays(count, launch.resolve_device(None))
+    rng, rays = np.random.default_rng(seed), empty_rays(count, launch.resolve_device(None), carries_footprints=True)
     for name in RayBuffer.vars:
         array = getattr(rays, name)
         array.assign(rng.integers(0, 100, array.numpy().shape).astype(array.numpy().dtype))
@@ -72,12 +73,14 @@ def some_rays(count: int, seed: int) -> RayBuffer:
 
 
 def values(buffer: RayBuffer) -> dict[str, list]:
-    return {name: getattr(buffer, name).numpy().tolist() for name in RayBuffer.vars}
+    arrays = {name: getattr(buffer, name).numpy() for name in RayBuffer.vars}
+    arrays["footprint"] = structured_to_unstructured(arrays["footprint"])
+    return {name: array.tolist() for name, array in arrays.items()}
 
 
 def test_every_field_of_a_ray_is_copied_and_joined() -> None:
     rays, others = some_rays(5, 0), some_rays(3, 1)
-    turned = empty_rays(5, launch.resolve_device(None))
+    turned = empty_rays(5, launch.resolve_device(None), carries_footprints=True)
     launch.launch(turn_round, 5, [rays, turned], launch.resolve_device(None))
     assert values(turned) == {name: array[::-1] for name, array in values(rays).items()}
     both = joined(RayBuffer, [rays, others])

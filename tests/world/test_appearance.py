@@ -13,7 +13,7 @@ from ldtrefl.files.stored_picture import StoredPicture
 from ldtrefl.scene import shapes
 from ldtrefl.scene.description import Camera, Environment, Lighting, Material, Object, Scene
 from ldtrefl.scene.mesh import Mesh, Part
-from ldtrefl.scene.surface_material import SurfaceMaterial
+from ldtrefl.scene.surface_material import SurfaceMaterial, Texture
 from ldtrefl.world.appearance import appearance_of
 from tests.part_materials import textured
 
@@ -30,13 +30,16 @@ def quadrants(tmp_path: Path) -> Path:
     return tmp_path / "quadrants.png"
 
 
+@pytest.mark.parametrize("is_filtered", [False, True], ids=["at points", "filtered"])
 @pytest.mark.parametrize("method", ["bvh", "ldt"])
-def test_textures_are_upright_directly_and_mirrored(tmp_path: Path, method: str) -> None:
+def test_textures_are_upright_directly_and_mirrored(tmp_path: Path, method: str, is_filtered: bool) -> None:
     texture = str(quadrants(tmp_path))
     camera = Camera(eye=(0, 0, 5), look_at=(0, 0, 0), up=(0, 1, 0), width=32, height=32, fov_y=10)
     lit = Lighting(ambient=(1, 1, 1))
     sheet = Object(shape="plane", material=Material(albedo=(1, 1, 1), texture=texture))
-    direct = ldtrefl.render(Scene(camera=camera, lighting=lit, objects=(sheet,)), method).image
+    direct = ldtrefl.render(
+        Scene(camera=camera, lighting=lit, objects=(sheet,)), method, filter_textures=is_filtered
+    ).image
     corners = [direct[4, 4], direct[4, 27], direct[27, 4], direct[27, 27]]
     np.testing.assert_allclose(corners, [[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]], atol=ROUNDING)
 
@@ -46,7 +49,7 @@ def test_textures_are_upright_directly_and_mirrored(tmp_path: Path, method: str)
         shape="plane", scale=2.0, rotate=(0, 1, 0, 180), translate=(0, 0, 8), material=sheet.material, smooth=False
     )
     scene = Scene(camera=camera, lighting=lit, environment=Environment(), objects=(mirror, sheet))
-    reflected = ldtrefl.render(scene, method).reflection
+    reflected = ldtrefl.render(scene, method, filter_textures=is_filtered).reflection
     # Turned by 180 degrees about y the sheet's left is at +x; the mirror shows it where it is.
     corners = [reflected[4, 27], reflected[4, 4], reflected[27, 27], reflected[27, 4]]
     np.testing.assert_allclose(corners, [[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]], atol=ROUNDING)
@@ -98,3 +101,17 @@ def test_a_materials_texture_takes_the_place_of_all_parts_own() -> None:
     mesh = Mesh(plane.vertices, plane.faces, None, plane.uvs, (Part(0, textured(own)), Part(4)))
     made = appearance_of(mesh, given, launch.resolve_device("cpu"))
     assert made.texel_bytes.numpy().tolist() == [[9, 9, 9]] and (made.part_texture.numpy()[:, 1] == 1).all()
+
+
+def test_mip_maps_stand_beside_textures_that_are_filtered() -> None:
+    """4 x 2 texels have maps of 2 x 1 and 1 x 1, after those of the picture before."""
+    wide, one = np.full((2, 4, 3), 9, np.uint8), np.full((2, 2, 3), 7, np.uint8)
+    materials = [SurfaceMaterial(base_texture=Texture(StoredPicture(picture))) for picture in (one, wide, one)]
+    parts = tuple(Part(k, material) for k, material in enumerate(materials))
+    square = shapes.make("plane")
+    mesh = Mesh(square.vertices, np.tile(square.faces[:1], (3, 1)), uvs=square.uvs, parts=parts)
+    plain, filtered = (appearance_of(mesh, None, launch.resolve_device("cpu"), filters=f) for f in (False, True))
+    assert plain.part_mips.shape == (0,) and plain.mip_bytes.shape == (0,)
+    assert filtered.part_mips.numpy().tolist() == [0, 1, 0]
+    assert filtered.mip_bytes.numpy()[:, 0].tolist() == [7, 9, 9, 9]
+    assert filtered.mip_texels.shape == (0,)

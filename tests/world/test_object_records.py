@@ -5,7 +5,7 @@ import pytest
 
 from ldtrefl.device import launch
 from ldtrefl.scene.description import Camera, Material, Object, Scene
-from ldtrefl.world.device_scene import DeviceScene
+from ldtrefl.world.device_scene import DeviceScene, Uploads
 
 CPU = launch.resolve_device("cpu")
 CAMERA = Camera(eye=(0, -5, 0), look_at=(0, 0, 0), width=4, height=4)
@@ -13,7 +13,8 @@ PLACED = {"scale": (1.0, 2.0, 0.5), "rotate": (1.0, 2.0, 3.0, 40.0), "translate"
 
 
 def on_device(*objects: Object, skip_attributes: bool = True) -> DeviceScene:
-    return DeviceScene(Scene(camera=CAMERA, objects=objects), CPU, skip_attributes=skip_attributes)
+    uploads = Uploads(skip_attributes=skip_attributes)
+    return DeviceScene(Scene(camera=CAMERA, objects=objects), CPU, uploads=uploads)
 
 
 def test_matrices_take_unit_space_to_the_device_and_back() -> None:
