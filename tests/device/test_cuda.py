@@ -1,6 +1,5 @@
 """Every kernel compiles for CUDA; no GPU is needed for that. None has constants that a compiler must warn of."""
 
-import itertools
 import re
 from pathlib import Path
 
@@ -25,17 +24,18 @@ LITTLE = 1
 has a fault in some versions."""
 
 
-FEATURES = (
-    ShadingFeatures(),
-    ShadingFeatures(looks=True),
-    ShadingFeatures(shadows=True),
-    ShadingFeatures(looks=True, shadows=True, dimmed_shadows=True),
-    ShadingFeatures(shaped_lights=True, visible_lights=True),
-    ShadingFeatures(*[True] * 6),
-    ShadingFeatures(probes=16, footprints=True),
-    ShadingFeatures(*[True] * 6, probes=16, footprints=True),
+SHADOWS = ShadingFeatures(shadows=True)
+SHADED = (
+    (NOTHING, ShadingFeatures()),
+    (NOTHING, ShadingFeatures(looks=True)),
+    (NOTHING, ShadingFeatures(shaped_lights=True, visible_lights=True)),
+    (NOTHING, ShadingFeatures(probes=16, footprints=True)),
+    *((tracer, SHADOWS) for tracer in (BVH, *TRACERS.values())),
+    (TRACERS["exact"], ShadingFeatures(looks=True, shadows=True, dimmed_shadows=True)),
+    (BVH, ShadingFeatures(*[True] * 6, probes=16, footprints=True)),
 )
-"""What scenes may have."""
+"""What answers shadow rays, and what scenes have. What they have is told by each feature and by all: how a tracer goes
+about its rays is the same whatever it is asked by."""
 
 
 def all_kernels() -> list[wp.Kernel]:
@@ -46,12 +46,11 @@ def all_kernels() -> list[wp.Kernel]:
         search_pixels_kernel(tracer, 1)
     for has_looks in (False, True):
         describe_kernel(has_looks)
-    for tracer, features in itertools.product((NOTHING, BVH, *TRACERS.values()), FEATURES):
-        if features.shadows == (tracer is not NOTHING):
-            shade_hits_kernel(tracer, features)
-            shade_pixels_kernel(tracer, features)
-            shade_reflectors_kernel(tracer, True, features)
-            shade_reflectors_kernel(tracer, False, features)
+    for tracer, features in SHADED:
+        shade_hits_kernel(tracer, features)
+        shade_pixels_kernel(tracer, features)
+        shade_reflectors_kernel(tracer, True, features)
+    shade_reflectors_kernel(NOTHING, False, ShadingFeatures())
     return [kernel for kernel in launch.KERNELS if kernel.func.__module__.startswith("ldtrefl.")]
 
 
