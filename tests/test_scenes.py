@@ -9,6 +9,7 @@ import pytest
 
 import ldtrefl
 from ldtrefl.compare import metrics
+from ldtrefl.files.tone_mapping import shown
 from tests.conftest import SCENES
 
 SHIPPED = sorted(SCENES.glob("*.toml"))
@@ -28,6 +29,12 @@ THREADED = ("bowl_mirror", "facing_balls", "teapot", "thousand_pearls", "two_bal
 They have a mirror that sees itself, shadows and many bounces, textures, many objects, or a flat mirror."""
 
 ALL = SHIPPED + sorted((SCENES / "paper").glob("*.toml")) + sorted((SCENES / "meshes").glob("*.toml"))
+
+
+GALLERY = sorted((SCENES / "gallery").glob("*.toml"))
+"""Scenes with all that makes a picture: presets, lights with shapes, tone mapping. They are compared small."""
+
+SMALLER = 4
 
 
 def name_of(path: Path) -> str:
@@ -126,3 +133,15 @@ def test_contact_shows_no_gap() -> None:
     assert truth.distance.min() < 0.03 and made.distance.min() < truth.distance.min() + texel
     near = truth.distance < 0.1
     assert near.sum() > 200 and (made.object[near] == truth.object[near]).mean() > 0.99
+
+
+@pytest.mark.parametrize("path", GALLERY, ids=name_of)
+def test_a_picture_of_the_gallery_agrees_with_the_truth(path: Path) -> None:
+    """With the samples that a user gets."""
+    scene = loaded(path)
+    camera = scene.camera
+    small = dataclasses.replace(camera, width=camera.width // SMALLER, height=camera.height // SMALLER)
+    image, truth = (ldtrefl.render(scene.with_camera(small), method, samples=4).image for method in ("ldt", "bvh"))
+    assert metrics.ssim(image, truth, np.ones(truth.shape[:2], bool)) >= scene.expect["ldt"].ssim
+    picture = shown(image, scene.picture.exposure, scene.picture.tone_mapping)
+    assert 0.1 < picture.mean() < 0.9 and picture.std() > 0.05

@@ -1,7 +1,7 @@
-"""Renders the README's pictures: a scene by layered depth textures with the ray-traced truth inset, a mesh on every
-stage, mirrors that see themselves and one another, and peeled layers.
+"""Renders the README's pictures: two of the gallery, a scene with the ray-traced truth inset, a mesh on every stage,
+mirrors that see themselves and one another, and peeled layers.
 
-    python tools/readme_picture.py             # half a minute; writes four pictures into docs/
+    python tools/readme_picture.py             # a minute; writes five pictures into docs/
     python tools/readme_picture.py FOLDER      # the same into another folder
 
 The scenes are those of ``scenes/``, the mesh on the stages is the shape ``teapot``, and the layers those of the shape
@@ -17,6 +17,8 @@ import numpy as np
 
 import ldtrefl
 from ldtrefl.compare.layer_picture import draw_layers
+from ldtrefl.files.srgb import linear_from_srgb
+from ldtrefl.files.tone_mapping import shown
 from ldtrefl.scene import shapes
 from ldtrefl.scene.composed import composed
 
@@ -26,6 +28,9 @@ CROP = (slice(182, 342), slice(288, 528))
 
 FRAME = 3
 """Width of the inset's white frame, pixels."""
+
+GALLERY = ("photograph", "cluttered_room")
+"""Names of the scenes that the README begins with."""
 
 MIRRORS = (
     ("facing_balls", "linked_mirrors", "thousand_pearls"),
@@ -52,6 +57,7 @@ def main() -> None:
     parser.add_argument("folder", type=Path, nargs="?", default=ROOT / "docs", help="where the pictures go")
     folder = parser.parse_args().folder
     ldtrefl.save_image(folder / "teapot.png", picture_with_inset())
+    ldtrefl.save_image(folder / "gallery.png", picture_of_gallery())
     ldtrefl.save_image(folder / "stages.png", picture_of_stages())
     ldtrefl.save_image(folder / "mirrors.png", picture_of_mirrors())
     shape = shapes.make("genus3")
@@ -69,6 +75,11 @@ def picture_with_inset() -> np.ndarray:
     framed[FRAME:-FRAME, FRAME:-FRAME] = inset
     picture[: framed.shape[0], -framed.shape[1] :] = framed
     return picture
+
+
+def picture_of_gallery() -> np.ndarray:
+    """(h, w, 3) float32: the scenes of ``GALLERY`` side by side, at their size."""
+    return _side_by_side([rendered(f"gallery/{name}") for name in GALLERY], axis=1)
 
 
 def picture_of_stages() -> np.ndarray:
@@ -90,8 +101,9 @@ def rendered(name: str) -> np.ndarray:
 
 
 def as_shown(scene: ldtrefl.Scene) -> np.ndarray:
-    """(h, w, 3) float32: a scene as the screen shows it: what is brighter than white is white."""
-    return ldtrefl.render(scene, "ldt").image.clip(0.0, 1.0)
+    """(h, w, 3) float32: a scene as the screen shows it, by its exposure and tone mapping, in linear light."""
+    image, picture = ldtrefl.render(scene, "ldt").image, scene.picture
+    return linear_from_srgb(shown(image, picture.exposure, picture.tone_mapping))
 
 
 def halved(picture: np.ndarray) -> np.ndarray:
