@@ -25,6 +25,7 @@ has a fault in some versions."""
 
 
 SHADOWS = ShadingFeatures(shadows=True)
+EVERYTHING = ShadingFeatures(*[True] * 6, probes=16, footprints=True)
 SHADED = (
     (NOTHING, ShadingFeatures()),
     (NOTHING, ShadingFeatures(looks=True)),
@@ -32,10 +33,10 @@ SHADED = (
     (NOTHING, ShadingFeatures(probes=16, footprints=True)),
     *((tracer, SHADOWS) for tracer in (BVH, *TRACERS.values())),
     (TRACERS["exact"], ShadingFeatures(looks=True, shadows=True, dimmed_shadows=True)),
-    (BVH, ShadingFeatures(*[True] * 6, probes=16, footprints=True)),
+    (BVH, EVERYTHING),
 )
-"""What answers shadow rays, and what scenes have. What they have is told by each feature and by all: how a tracer goes
-about its rays is the same whatever it is asked by."""
+"""What answers shadow rays, and what scenes have: each feature, each tracer, and all features together. All kernels that
+shade call the same functions, so not each of them is built for each of these."""
 
 
 def all_kernels() -> list[wp.Kernel]:
@@ -48,6 +49,7 @@ def all_kernels() -> list[wp.Kernel]:
         describe_kernel(has_looks)
     for tracer, features in SHADED:
         shade_hits_kernel(tracer, features)
+    for tracer, features in ((NOTHING, EVERYTHING.without_rays()), (BVH, SHADOWS)):
         shade_pixels_kernel(tracer, features)
         shade_reflectors_kernel(tracer, True, features)
     shade_reflectors_kernel(NOTHING, False, ShadingFeatures())
