@@ -35,8 +35,8 @@ SHADED = (
     (TRACERS["exact"], ShadingFeatures(looks=True, shadows=True, dimmed_shadows=True)),
     (BVH, EVERYTHING),
 )
-"""What answers shadow rays, and what scenes have: each feature, each tracer, and all features together. All kernels that
-shade call the same functions, so not each of them is built for each of these."""
+"""What answers shadow rays, and what scenes have: each feature, each tracer, and all features together. All kernels
+that shade call the same functions, so not each of them is built for each of these."""
 
 
 def all_kernels() -> list[wp.Kernel]:
