@@ -141,9 +141,9 @@ def test_the_table_of_shapes_has_their_parameters() -> None:
 
 def test_every_key_of_a_scene_is_in_the_reference() -> None:
     text = SCENE_REFERENCE.read_text()
-    for kind in ("Camera", "Environment", "Lighting", "Light", "Object", "Material", "Reflection"):
+    for kind in ("Camera", "Environment", "Lighting", "Light", "Object", "Material", "Picture", "Reflection"):
         for key in getattr(ldtrefl, kind).__dataclass_fields__:
-            assert re.search(rf"\b{key} = |`{key}`|\[object\.{key}\]", text), f"{kind}.{key}"
+            assert re.search(rf"\b{key} = |`{key}`|\[(object|lighting)\.{key}\]", text), f"{kind}.{key}"
 
 
 def test_architecture_names_what_is_there() -> None:

@@ -13,7 +13,7 @@ from stress_cases.inputs import rays_about
 
 import ldtrefl
 from ldtrefl.device import cpu_threads, native_sources, warp_abi
-from ldtrefl.frame import instances, run_rays
+from ldtrefl.frame import contrast, instances, run_rays
 from ldtrefl.ldt.exact import walk, wide_tree
 from ldtrefl.ldt.exact.tree import TreeView
 from ldtrefl.ldt.exact.walk import CONSTANTS, FILES, SEARCH, TREE
@@ -49,6 +49,8 @@ SOURCES = {
     "device/cpu_threads.h": (cpu_threads.CONSTANTS, ()),
     "device/vectors.h": ({}, ()),
     "frame/backdrop.h": ({}, ("device/vectors.h",)),
+    "frame/contrast.h": (contrast.CONSTANTS, ("device/vectors.h",)),
+    "frame/smooth.h": ({}, ("device/vectors.h",)),
     "shading/finish.h": (finish.CONSTANTS | {"MOST_PROBES": 16}, finish.FILES[:-1]),
     "shading/pictures.h": (textures.PICTURE_CONSTANTS | {"MOST_PROBES": 16}, ()),
     "shading/highlights.h": (highlights.CONSTANTS, ()),
