@@ -127,7 +127,7 @@ def _kinds(path: Path) -> list[str]:
     """The kinds of mesh files that a file has."""
     if path.suffix.lower() not in PACKED:
         return [path.suffix.lower().lstrip(".")]
-    from ldtrefl.scene.readers.archives import kinds_inside  # noqa: PLC0415  trimesh takes a quarter of a second
+    from ldtrefl.scene.readers.archives import kinds_inside  # noqa: PLC0415
 
     return kinds_inside(str(path))
 

@@ -14,13 +14,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ldtrefl.base.errors import InputError
-from ldtrefl.scene.gltf.container import Beside, Document
+from ldtrefl.scene.gltf.container import Document
 from ldtrefl.scene.gltf.extensions import check_required, not_shown
 from ldtrefl.scene.gltf.lights import CameraNode, LightNode, camera_of, light_of
 from ldtrefl.scene.gltf.materials import Materials
 from ldtrefl.scene.gltf.nodes import Node, nodes_of_scene
 from ldtrefl.scene.gltf.primitives import Primitive, modes_without_surface, primitives_of
 from ldtrefl.scene.gltf.skins import joint_matrices, posed
+from ldtrefl.scene.readers.files_beside import Beside
 
 _log = logging.getLogger("ldtrefl")
 

@@ -10,13 +10,13 @@ import base64
 import binascii
 import json
 import sys
-from collections.abc import Callable
 from typing import Any
 from urllib.parse import unquote, unquote_to_bytes
 
 from ldtrefl.base import budget
 from ldtrefl.base.errors import InputError
 from ldtrefl.scene.gltf import meshopt
+from ldtrefl.scene.readers.files_beside import Beside
 
 MAGIC = b"glTF"
 JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
@@ -39,10 +39,6 @@ COMPRESSIONS = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 
 Table = dict[str, Any]
 """A JSON object."""
-
-Beside = Callable[[str], bytes]
-"""Reads a file of the asset's folder, by its path from there; asks for the memory first. It raises OSError or
-ValueError where there is none."""
 
 
 def is_glb(data: bytes) -> bool:

@@ -20,13 +20,13 @@ from ldtrefl.base.errors import InputError, printable
 from ldtrefl.scene.decomposition import placed
 from ldtrefl.scene.description import Camera, Light, Object
 from ldtrefl.scene.gltf.asset import Asset, MeshNode
-from ldtrefl.scene.gltf.container import Beside
 from ldtrefl.scene.gltf.lights import CameraNode, LightNode
 from ldtrefl.scene.gltf.pieces import pieces_of
 from ldtrefl.scene.joining import joined_mesh, joining_bytes
 from ldtrefl.scene.mesh import Mesh
 from ldtrefl.scene.piece import NARROWEST_SHARE, axes_left, moved
 from ldtrefl.scene.readers.archives import mesh_files
+from ldtrefl.scene.readers.files_beside import Beside
 from ldtrefl.scene.scene_parts import OBJECT_BYTES, SceneParts
 
 PIXELS = 768 * 512

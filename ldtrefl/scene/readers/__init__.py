@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 def load_mesh(path: str | Path) -> Mesh:
-    """``load_mesh`` of ``mesh_files.py``. That is imported when the first file is read: trimesh takes a quarter of a
+    """``load_mesh`` of ``mesh_files.py``. That is imported when the first file is read: it takes a tenth of a
     second, and many scenes have no mesh file."""
     from ldtrefl.scene.readers import mesh_files  # noqa: PLC0415
 

@@ -11,12 +11,9 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path, PurePosixPath
 from typing import BinaryIO, cast
 
-from trimesh import resolvers
-from trimesh.exchange.load import mesh_formats
-
 from ldtrefl.base import budget
 from ldtrefl.base.errors import InputError
-from ldtrefl.scene.readers.files_beside import FilesBeside
+from ldtrefl.scene.readers.files_beside import FilesBeside, NamedFiles
 
 ARCHIVES = (".zip", ".tar.gz", ".tgz", ".tar.bz2", ".bz2", ".gz")
 """How the names of archives end, longer endings first."""
@@ -24,8 +21,8 @@ ARCHIVES = (".zip", ".tar.gz", ".tgz", ".tar.bz2", ".bz2", ".gz")
 PACKED_ALONE: dict[str, Callable] = {".gz": gzip.open, ".bz2": bz2.open}
 """Of a single file; what that names stands beside the archive."""
 
-OWN_KINDS = ("3mf", "obj", "off", "ply", "stl", "stl_ascii")
-"""What our own readers read, besides glTF."""
+OWN_KINDS = ("3mf", "glb", "gltf", "obj", "off", "ply", "stl", "stl_ascii")
+"""What our own readers read."""
 
 MOST_MEMBERS = 10_000
 """Files in an archive: a directory entry is small in the archive and large in memory."""
@@ -39,8 +36,8 @@ def archive_kind(path: str | Path) -> str | None:
     return next((ending for ending in ARCHIVES if str(path).lower().endswith(ending)), None)
 
 
-def mesh_files(path: str) -> Iterator[tuple[bytes, str, resolvers.Resolver]]:
-    """Every mesh file in a file: (its bytes, its kind such as 'obj', trimesh's resolver for the files beside it).
+def mesh_files(path: str) -> Iterator[tuple[bytes, str, NamedFiles]]:
+    """Every mesh file in a file: (its bytes, its kind such as 'obj', the files beside it).
 
     Raises:
         InputError: an archive without mesh files or with too many files, or unpacked more than is allowed.
@@ -57,7 +54,9 @@ def mesh_files(path: str) -> Iterator[tuple[bytes, str, resolvers.Resolver]]:
             yield _unpacked(cast(BinaryIO, stream)).getvalue(), _kind(name), FilesBeside(path)
         return
     members = _zip_members(path) if kind == ".zip" else _tar_members(path)
-    beside = resolvers.ZipResolver({name: io.BytesIO(data) for name, data in members.items()})
+    from trimesh.resolvers import ZipResolver  # noqa: PLC0415  half a second, and few files are packed so
+
+    beside = ZipResolver({name: io.BytesIO(data) for name, data in members.items()})
     for name in _check_kinds(members):
         yield members[name], _kind(name), beside
 
@@ -78,15 +77,21 @@ def kinds_inside(path: str) -> list[str]:
 
 def mesh_kinds() -> list[str]:
     """How the names of mesh files may end."""
+    from trimesh.exchange.load import mesh_formats  # noqa: PLC0415  half a second
+
     return sorted({*mesh_formats(), *OWN_KINDS})
+
+
+def is_mesh_kind(kind: str) -> bool:
+    """Whether files whose names end so can be read. Of those of our own trimesh is not asked."""
+    return kind in OWN_KINDS or kind in mesh_kinds()
 
 
 def _check_kinds(names: Iterable[str]) -> list[str]:
     """Those of an archive's files that are meshes."""
-    kinds = mesh_kinds()
-    found = [name for name in names if _kind(name) in kinds and not _is_hidden(name)]
+    found = [name for name in names if is_mesh_kind(_kind(name)) and not _is_hidden(name)]
     if not found:
-        raise InputError(f"no mesh file in the archive (read are {', '.join(kinds)})")
+        raise InputError(f"no mesh file in the archive (read are {', '.join(mesh_kinds())})")
     return found
 
 

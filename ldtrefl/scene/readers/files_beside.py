@@ -3,18 +3,29 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pathlib import Path
-
-from trimesh import resolvers
+from typing import Protocol
 
 from ldtrefl.base import budget
 from ldtrefl.base.errors import InputError
+
+Beside = Callable[[str], bytes]
+"""Reads one of them by the name that the mesh file has for it; asks for the memory first. It raises OSError or
+ValueError where there is none."""
 
 Stamp = tuple[int, int] | None
 """The time of a file's last change in nanoseconds, and its size; None where there is no such file."""
 
 
-class FilesBeside(resolvers.FilePathResolver):
+class NamedFiles(Protocol):
+    """Where the files are that a mesh file names."""
+
+    def get(self, name: str) -> bytes:
+        """As ``Beside`` does."""
+
+
+class FilesBeside:
     """Reads files of a mesh file's folder, plain ones alone, once the memory for them has been asked for.
 
     It remembers how those that were asked for stood before they were read, and which were missing.
@@ -24,7 +35,7 @@ class FilesBeside(resolvers.FilePathResolver):
         """Args:
         source: the mesh file.
         """
-        super().__init__(source)
+        self._parent = Path(source).resolve().parent
         self._stamps: dict[str, Stamp] = {}
 
     def get(self, name: str) -> bytes:
@@ -35,18 +46,18 @@ class FilesBeside(resolvers.FilePathResolver):
             FileNotFoundError, ValueError: there is none, or it is not in the folder.
         """
         for candidate in (name.strip(), name.strip().lstrip("/"), Path(name).name):
-            try:
-                path = self.absolute(candidate)
-            except ValueError:
+            path = (self._parent / candidate).resolve()
+            if not path.is_relative_to(self._parent):
                 continue
-            place = os.path.join(self.parent, candidate)
+            place = os.path.join(self._parent, candidate)
             self._stamps.setdefault(place, _stamp(place))
             if path.exists():
                 if not path.is_file():
                     raise InputError(f"'{candidate}' beside it is not a file")
                 budget.take(path.stat().st_size, f"'{candidate}' beside it")
                 return path.read_bytes()
-        self.absolute(name)
+        if not (self._parent / name.strip()).resolve().is_relative_to(self._parent):
+            raise ValueError(f"'{name}' is outside of its folder")
         raise FileNotFoundError(name)
 
     def are_as_read(self) -> bool:

@@ -15,7 +15,6 @@ import weakref
 from pathlib import Path
 
 import numpy as np
-from trimesh.resolvers import Resolver
 
 from ldtrefl.base import budget
 from ldtrefl.base.errors import InputError, printable
@@ -26,15 +25,14 @@ from ldtrefl.scene.gltf.pieces import placed_pieces
 from ldtrefl.scene.joining import joined_mesh, joining_bytes
 from ldtrefl.scene.mesh import Mesh
 from ldtrefl.scene.piece import Piece
-from ldtrefl.scene.readers.archives import ARCHIVES, archive_kind, mesh_files, mesh_kinds
-from ldtrefl.scene.readers.files_beside import FilesBeside
+from ldtrefl.scene.readers.archives import ARCHIVES, archive_kind, is_mesh_kind, mesh_files, mesh_kinds
+from ldtrefl.scene.readers.files_beside import FilesBeside, NamedFiles
 from ldtrefl.scene.readers.memory import reading_bytes
 from ldtrefl.scene.readers.obj import pieces_of_obj
 from ldtrefl.scene.readers.off import pieces_of_off
 from ldtrefl.scene.readers.ply import pieces_of_ply
 from ldtrefl.scene.readers.stl import pieces_of_stl
 from ldtrefl.scene.readers.threemf import pieces_of_3mf
-from ldtrefl.scene.readers.trimesh_pieces import pieces_by_trimesh
 from ldtrefl.scene.readers.trimesh_warnings import trimesh_warnings
 
 _log = logging.getLogger("ldtrefl")
@@ -89,7 +87,7 @@ def _is_current(mesh: Mesh) -> bool:
 @shared_while_current(_is_current)
 def _load_mesh(path: str, _modified: int, _size: int) -> Mesh:
     """The mesh of a file as it stands: the time of its last change and its size tell whether it is the same."""
-    if archive_kind(path) is None and Path(path).suffix.lower().lstrip(".") not in mesh_kinds():
+    if archive_kind(path) is None and not is_mesh_kind(Path(path).suffix.lower().lstrip(".")):
         kinds = ", ".join(sorted([*mesh_kinds(), *(ending.lstrip(".") for ending in ARCHIVES)]))
         raise InputError(f"{path}: not a kind of mesh file that can be read (allowed: {kinds})")
     # What NumPy would warn of ends in a check of the mesh.
@@ -122,7 +120,7 @@ def _read_pieces(path: str) -> tuple[list[Piece], list[FilesBeside]]:
     return pieces, files
 
 
-def _read(data: bytes, kind: str, beside: Resolver) -> tuple[list[Piece], list[str]]:
+def _read(data: bytes, kind: str, beside: NamedFiles) -> tuple[list[Piece], list[str]]:
     """(the pieces of a mesh file of some kind, what it holds that they do not show)."""
     if kind in GLTF:
         asset = Asset.read(data, beside.get)
@@ -141,8 +139,10 @@ def _hides_alpha(piece: Piece) -> bool:
     return piece.colors is not None and is_opaque and bool((piece.colors[:, 3] < 1.0).any())
 
 
-def _read_by_trimesh(data: bytes, kind: str, beside: Resolver) -> tuple[list[Piece], list[str]]:
+def _read_by_trimesh(data: bytes, kind: str, beside: NamedFiles) -> tuple[list[Piece], list[str]]:
     """The same of kinds without a reader of our own."""
+    from ldtrefl.scene.readers.trimesh_pieces import pieces_by_trimesh  # noqa: PLC0415  trimesh takes half a second
+
     with budget.given_back():
         budget.take(reading_bytes(data, kind), f"reading it as {kind}")
     with trimesh_warnings() as warnings:

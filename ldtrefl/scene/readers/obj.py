@@ -16,9 +16,10 @@ from ldtrefl.base.errors import InputError
 from ldtrefl.files.srgb import linear_from_srgb
 from ldtrefl.scene.piece import Piece, unit_vectors
 from ldtrefl.scene.readers.corner_tables import cut_faces, split_corners, take_for_triangles
+from ldtrefl.scene.readers.files_beside import Beside
 from ldtrefl.scene.readers.mtl import MaterialLibrary
 from ldtrefl.scene.readers.obj_text import ObjTables, read_tables
-from ldtrefl.scene.readers.pictures import Beside, Pictures, file_beside
+from ldtrefl.scene.readers.pictures import Pictures, file_beside
 from ldtrefl.scene.surface_material import PLAIN, SurfaceMaterial, Texture
 
 WITH_NORMALS = 1 << 30

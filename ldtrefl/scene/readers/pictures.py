@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 
@@ -14,9 +13,7 @@ from ldtrefl.base.errors import InputError
 from ldtrefl.files.mesh_textures import unpacked_picture
 from ldtrefl.files.srgb import srgb_from_linear
 from ldtrefl.files.stored_picture import StoredPicture
-
-Beside = Callable[[str], bytes]
-"""The bytes of a file by the name that the mesh file has for it."""
+from ldtrefl.scene.readers.files_beside import Beside
 
 OPAQUE = 255
 

@@ -22,7 +22,8 @@ from ldtrefl.scene.readers.corner_tables import (
     take_for_triangles,
     with_vertices,
 )
-from ldtrefl.scene.readers.pictures import Beside, Pictures
+from ldtrefl.scene.readers.files_beside import Beside
+from ldtrefl.scene.readers.pictures import Pictures
 from ldtrefl.scene.readers.ply_tables import Table, read_header, read_tables
 from ldtrefl.scene.surface_material import PLAIN, SurfaceMaterial, Texture
 

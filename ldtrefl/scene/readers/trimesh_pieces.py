@@ -16,11 +16,35 @@ from trimesh.resolvers import Resolver
 
 from ldtrefl.scene.mesh import Mesh
 from ldtrefl.scene.piece import Piece, moved, unit_vectors
+from ldtrefl.scene.readers.files_beside import NamedFiles
 from ldtrefl.scene.readers.polygons import triangles_of
 from ldtrefl.scene.readers.trimesh_materials import with_materials
 
 
-def pieces_by_trimesh(data: bytes, kind: str, beside: Resolver) -> list[Piece]:
+class _AsResolver(Resolver):  # type: ignore[misc]
+    """Files beside a mesh file as trimesh asks for them: to read, and no more."""
+
+    def __init__(self, beside: NamedFiles, folder: str = "") -> None:
+        self._beside, self._folder = beside, folder
+
+    def get(self, key: str) -> bytes:
+        """The bytes of a file."""
+        return self._beside.get(self._folder + key)
+
+    def write(self, name: str, data: object) -> None:
+        """Nothing is written."""
+        raise PermissionError(name)
+
+    def namespaced(self, namespace: str) -> Resolver:
+        """The files of a folder beside it."""
+        return _AsResolver(self._beside, f"{self._folder}{namespace}/")
+
+    def keys(self) -> list[str]:
+        """Which files there are is not told."""
+        return []
+
+
+def pieces_by_trimesh(data: bytes, kind: str, beside: NamedFiles) -> list[Piece]:
     """The pieces of a mesh file in the order of its nodes, where these place them.
 
     Args:
@@ -31,7 +55,7 @@ def pieces_by_trimesh(data: bytes, kind: str, beside: Resolver) -> list[Piece]:
     Raises:
         InputError: a triangle has a vertex that there is not. Other exceptions: the file is damaged.
     """
-    read = mesh_loaders[kind](file_obj=io.BytesIO(data), file_type=kind, resolver=beside, metadata=None)
+    read = mesh_loaders[kind](file_obj=io.BytesIO(data), file_type=kind, resolver=_AsResolver(beside), metadata=None)
     if "geometry" not in read:
         geometry, nodes = {"": read}, [{"geometry": "", "frame_to": ""}]
     else:
