@@ -75,6 +75,17 @@ def sight(gbuffer: GBufferView, pixel: int, sightings: wp.array(dtype=Sighting),
     sightings[lane].way = ray_through(gbuffer, pixel)
 
 
+@wp.func
+def sight_group(gbuffer: GBufferView, begin: int, end: int, sightings: wp.array(dtype=Sighting)) -> int:
+    """Let the lanes of a group see what pixels from ``begin`` on see; those that see something, a bit each."""
+    lanes = int(0)
+    for i in range(begin, wp.min(begin + GROUP, end)):
+        if gbuffer.object[i] >= 0:
+            sight(gbuffer, i, sightings, i - begin)
+            lanes = lanes | (1 << (i - begin))
+    return lanes
+
+
 @launch.kernel
 def find_surfaces(
     first: int,
@@ -93,11 +104,7 @@ def find_surfaces(
     begin = block * (first + wp.tid())
     end = wp.min(begin + block, position_out.shape[0])
     while begin < end:
-        lanes = int(0)
-        for i in range(begin, wp.min(begin + GROUP, end)):
-            if gbuffer.object[i] >= 0:
-                sight(gbuffer, i, sightings, i - begin)
-                lanes = lanes | (1 << (i - begin))
+        lanes = sight_group(gbuffer, begin, end, sightings)
         look_from(objects, lanes, gbuffer.camera.eye, sightings, surfaces)
         while lanes != 0:
             lane = lowest_bit(wp.uint64(lanes))

@@ -1,8 +1,8 @@
 """Where a pixel is sampled, and how much each sample counts in the pixels about it.
 
 Samples lie at fixed places within a pixel, the same in all pixels: the centre, then three in a triangle about it if
-their number is even, then pairs on opposite sides, so that the image is not moved. Pairs are spread by the additive
-sequence of M. Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences" (2018).
+their number is even, then pairs on opposite sides, so that the image is not moved. Pairs are spread by a quasirandom
+sequence.
 
 The image is a mean with the weights of a Gaussian about the pixel's centre, of standard deviation 0.375 pixels along
 each axis, that ends at 1.5 pixels: so a pixel sees samples of its eight neighbours, too. A sample stands for the part
@@ -18,8 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-STEP = np.array([0.7548776662466927, 0.5698402909980532])
-"""1 / p and 1 / p^2, where p is the root of p^3 = p + 1 (Roberts)."""
+from ldtrefl.geometry.sampling import QUASIRANDOM
 
 TRIANGLE_RADIUS, TRIANGLE_ANGLE = 0.38, np.radians(15.0)
 """Of the three samples about the centre: no two of them, nor the centre, lie beside each other along an axis."""
@@ -40,7 +39,7 @@ def places(samples: int) -> np.ndarray:
     triangle = TRIANGLE_RADIUS * np.stack([np.cos(angles), np.sin(angles)], axis=1)
     about = triangle if samples % 2 == 0 else np.empty((0, 2))
     pairs = max(0, -(-(samples - 1 - len(about)) // 2))
-    one = (0.5 + np.arange(pairs)[:, None] * STEP) % 1.0 * (0.5, 1.0) - (0.0, 0.5)
+    one = (0.5 + np.arange(pairs)[:, None] * QUASIRANDOM) % 1.0 * (0.5, 1.0) - (0.0, 0.5)
     both = np.stack([one, -one], axis=1).reshape(-1, 2)
     return np.concatenate([np.zeros((1, 2)), about, both])[:samples]
 

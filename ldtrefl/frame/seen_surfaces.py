@@ -9,7 +9,7 @@ import warp as wp
 
 from ldtrefl.device import launch
 from ldtrefl.device.bits import lowest_bit
-from ldtrefl.frame.gbuffer import GBuffer, GBufferView, sight
+from ldtrefl.frame.gbuffer import GBuffer, GBufferView, sight_group
 from ldtrefl.shading.finish import Finish, finishing
 from ldtrefl.shading.surface import Surface
 from ldtrefl.shading.surfaces import GROUP, Sighting, coloring, look_from
@@ -73,11 +73,7 @@ def describe_kernel(has_looks: bool) -> wp.Kernel:
         begin = block * (first + wp.tid())
         end = wp.min(begin + block, depth_out.shape[0])
         while begin < end:
-            lanes = int(0)
-            for i in range(begin, wp.min(begin + GROUP, end)):
-                if gbuffer.object[i] >= 0:
-                    sight(gbuffer, i, sightings, i - begin)
-                    lanes = lanes | (1 << (i - begin))
+            lanes = sight_group(gbuffer, begin, end, sightings)
             look_from(objects, lanes, gbuffer.camera.eye, sightings, surfaces)
             while lanes != 0:
                 lane = lowest_bit(wp.uint64(lanes))

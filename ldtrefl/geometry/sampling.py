@@ -1,8 +1,13 @@
-"""Points of a square, spread over a disc and over directions. What is spread evenly stays so."""
+"""Points that are spread evenly: over a square, from there over a disc and over directions."""
 
 from __future__ import annotations
 
+import numpy as np
 import warp as wp
+
+QUASIRANDOM = np.array([0.7548776662466927, 0.5698402909980532])
+"""Steps along a square's axes of a sequence of points that is spread well however many are taken: 1 / p and 1 / p^2 of
+the root of p^3 = p + 1 (M. Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences", 2018)."""
 
 
 @wp.func

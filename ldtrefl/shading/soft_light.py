@@ -20,10 +20,10 @@ from ldtrefl.geometry.vectors import from_to
 from ldtrefl.shading.finish import Finish
 from ldtrefl.shading.form_factors import rectangle_form_factor, sphere_form_factor
 from ldtrefl.shading.highlights import highlights, wide_highlights
+from ldtrefl.shading.light_pattern import pattern_point, pattern_shift
 from ldtrefl.shading.light_samples import BEFORE_LIGHT, LightSample, sample_ambient, sample_light
 from ldtrefl.shading.light_shapes import nearest_in_light, solid_angle
 from ldtrefl.shading.radiance_limit import SMALLEST_SQUARE, at_most_largest
-from ldtrefl.shading.sample_pattern import pattern_point, pattern_shift
 from ldtrefl.shading.specular import mirrored
 from ldtrefl.shading.surface import Surface
 from ldtrefl.world.look_records import Looks

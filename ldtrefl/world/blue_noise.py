@@ -12,6 +12,8 @@ import functools
 
 import numpy as np
 
+from ldtrefl.geometry.sampling import QUASIRANDOM
+
 SIDE = 64
 """Pixels along a side."""
 
@@ -20,10 +22,6 @@ SPREAD = 1.5
 
 FIRST = SIDE * SIDE // 10
 """Pixels of the first pattern, of which clusters are taken out."""
-
-PLASTIC = 0.7548776662466927, 0.5698402909980532
-"""Steps of a sequence that spreads points over a square (M. Roberts, "The unreasonable effectiveness of quasirandom
-sequences", 2018): where the first pattern has its pixels."""
 
 
 @functools.cache
@@ -81,7 +79,7 @@ def _fill_void(pattern: np.ndarray, energy: np.ndarray) -> int:
 
 def _first_pattern() -> np.ndarray:
     """(SIDE^2,) bool."""
-    at = (np.arange(FIRST)[:, None] * PLASTIC % 1.0 * SIDE).astype(np.int64)
+    at = (np.arange(FIRST)[:, None] * QUASIRANDOM % 1.0 * SIDE).astype(np.int64)
     pattern = np.zeros(SIDE * SIDE, bool)
     pattern[at[:, 1] * SIDE + at[:, 0]] = True
     return pattern

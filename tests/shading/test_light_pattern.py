@@ -5,7 +5,7 @@ import pytest
 import warp as wp
 
 from ldtrefl.device import launch
-from ldtrefl.shading.sample_pattern import pattern_point, pattern_shift
+from ldtrefl.shading.light_pattern import pattern_point, pattern_shift
 from ldtrefl.world.blue_noise import SIDE, blue_noise
 
 
