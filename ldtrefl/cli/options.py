@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -24,34 +25,6 @@ from ldtrefl.scene.toml_text import parse_toml
 SIZE = re.compile(r"([0-9]{1,6})[xX]([0-9]{1,6})")
 """How ``--size`` is written."""
 
-SceneFile = Annotated[
-    Path, typer.Argument(metavar="SCENE|MESH", help="A scene file (TOML), or a mesh file such as PLY, OBJ or GLB.")
-]
-On = Annotated[
-    str | None,
-    typer.Option("--on", metavar="STAGE", help=f"Put a mesh on a stage: {', '.join(STAGES)}."),
-]
-Up = Annotated[
-    str | None,
-    typer.Option(
-        "--up",
-        metavar="AXIS",
-        help="The axis of a mesh file that points up, such as y or -z; its kind's if not given.",
-    ),
-]
-Turn = Annotated[
-    float,
-    typer.Option("--turn", metavar="DEGREES", help="Turn a mesh about that axis, counterclockwise as seen from above."),
-]
-Mirror = Annotated[
-    str | None, typer.Option("--mirror", metavar="self", help="'self' makes a mesh a mirror, on any stage.")
-]
-Lenient = Annotated[
-    bool, typer.Option("--lenient", help="Show what can be read of a glTF file that requires unknown extensions.")
-]
-Size = Annotated[
-    str | None, typer.Option("--size", metavar="WxH", help="Pixels of the picture; the scene's own if not given.")
-]
 Samples = Annotated[
     int | None,
     typer.Option(
@@ -73,18 +46,24 @@ Memory = Annotated[
         help="Memory that the scene may take, such as 8G or 512M; LDTREFL_MEMORY or else 4G if not given.",
     ),
 ]
-Device = Annotated[str | None, typer.Option(help="'cpu' (default) or a CUDA device such as 'cuda:0'.")]
-Threads = Annotated[int | None, typer.Option(help="CPU threads; all cores if not given.")]
 
 
-def use_resources(memory: str | None, threads: int | None) -> None:
-    """Obey ``--memory`` and ``--threads``.
+@dataclass(frozen=True)
+class Resources:
+    """What a command may use."""
 
-    Raises:
-        InputError: one of them is not allowed, or ``LDTREFL_MEMORY`` is not.
-    """
-    set_threads(threads)
-    allow_memory(memory)
+    device: Annotated[str | None, typer.Option(help="'cpu' (default) or a CUDA device such as 'cuda:0'.")] = None
+    threads: Annotated[int | None, typer.Option(help="CPU threads; all cores if not given.")] = None
+    memory: Memory = None
+
+    def use(self) -> None:
+        """Obey ``--memory`` and ``--threads``.
+
+        Raises:
+            InputError: one of them is not allowed, or ``LDTREFL_MEMORY`` is not.
+        """
+        set_threads(self.threads)
+        allow_memory(self.memory)
 
 
 def allow_memory(size: str | None) -> None:
@@ -97,24 +76,58 @@ def allow_memory(size: str | None) -> None:
     budget.memory_limit()  # so that a wrong value in the environment is found before any work is done
 
 
-def scene_of(
-    file: Path,
-    on: str | None = None,
-    up: str | None = None,
-    turn: float = 0.0,
-    mirror: str | None = None,
-    size: str | None = None,
-    lenient: bool = False,
-) -> Scene:
-    """The scene of a scene file or a mesh file, by the options above.
+@dataclass(frozen=True)
+class SceneWanted:
+    """A scene file, or a mesh file and what it is put on."""
 
-    Raises:
-        InputError: the file cannot be read, or an option is not allowed.
-    """
-    if mirror not in (None, "self"):
-        raise InputError(f"--mirror {mirror}: only 'self' is allowed")
-    pixels, mirror_self = parsed_size(size), mirror is not None
-    return load_scene(file, on=on, up=up, turn=turn, mirror_self=mirror_self, size=pixels, lenient=lenient)
+    scene: Annotated[
+        Path,
+        typer.Argument(metavar="SCENE|MESH", help="A scene file (TOML), or a mesh file such as PLY, OBJ or GLB."),
+    ]
+    on: Annotated[
+        str | None, typer.Option("--on", metavar="STAGE", help=f"Put a mesh on a stage: {', '.join(STAGES)}.")
+    ] = None
+    up: Annotated[
+        str | None,
+        typer.Option(
+            "--up",
+            metavar="AXIS",
+            help="The axis of a mesh file that points up, such as y or -z; its kind's if not given.",
+        ),
+    ] = None
+    turn: Annotated[
+        float,
+        typer.Option(
+            "--turn", metavar="DEGREES", help="Turn a mesh about that axis, counterclockwise as seen from above."
+        ),
+    ] = 0.0
+    mirror: Annotated[
+        str | None, typer.Option("--mirror", metavar="self", help="'self' makes a mesh a mirror, on any stage.")
+    ] = None
+    size: Annotated[
+        str | None, typer.Option("--size", metavar="WxH", help="Pixels of the picture; the scene's own if not given.")
+    ] = None
+    lenient: Annotated[
+        bool, typer.Option("--lenient", help="Show what can be read of a glTF file that requires unknown extensions.")
+    ] = False
+
+    def loaded(self) -> Scene:
+        """The scene.
+
+        Raises:
+            InputError: the file cannot be read, or an option is not allowed.
+        """
+        if self.mirror not in (None, "self"):
+            raise InputError(f"--mirror {self.mirror}: only 'self' is allowed")
+        return load_scene(
+            self.scene,
+            on=self.on,
+            up=self.up,
+            turn=self.turn,
+            mirror_self=self.mirror is not None,
+            size=parsed_size(self.size),
+            lenient=self.lenient,
+        )
 
 
 def parsed_size(size: str | None) -> tuple[int, int] | None:

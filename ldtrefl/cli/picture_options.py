@@ -17,47 +17,49 @@ from ldtrefl.frame.result import Frame
 from ldtrefl.scene.description import Scene
 from ldtrefl.scene.picture import Picture
 
-Exposure = Annotated[
-    float | None,
-    typer.Option(
-        "--exposure", metavar="STOPS", help="Each shows everything twice as bright; the scene's if not given."
-    ),
-]
-ToneMapping = Annotated[
-    str | None, typer.Option("--tone-mapping", metavar="NAME", help="none, agx or aces; the scene's if not given.")
-]
-Bits = Annotated[int | None, typer.Option("--bits", metavar="8|16", help="Of a channel of a PNG; 8 if not given.")]
-Quality = Annotated[
-    int | None,
-    typer.Option("--quality", metavar="1..100", help="Of JPEG and WebP; 92 if not given, 100 loses nothing."),
-]
-Transparent = Annotated[bool, typer.Option("--transparent", help="Leave out what lies behind all objects.")]
-AsLayers = Annotated[
-    bool, typer.Option("--layers", help="Write an EXR of what the picture is made of: reflections, depth, normals, ...")
-]
-
 
 @dataclass(frozen=True)
 class PictureOptions:
-    """What is written of a frame, and where; checked before any work is spent on it.
+    """What is written of a frame, and where."""
 
-    Raises:
-        InputError: the file cannot be written, or an option is not allowed, or not for such a file.
-    """
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="PNG, JPEG, WebP or EXR; the file's name with .png if not given."),
+    ] = None
+    exposure: Annotated[
+        float | None,
+        typer.Option(
+            "--exposure", metavar="STOPS", help="Each shows everything twice as bright; the scene's if not given."
+        ),
+    ] = None
+    tone_mapping: Annotated[
+        str | None, typer.Option("--tone-mapping", metavar="NAME", help="none, agx or aces; the scene's if not given.")
+    ] = None
+    bits: Annotated[
+        int | None, typer.Option("--bits", metavar="8|16", help="Of a channel of a PNG; 8 if not given.")
+    ] = None
+    quality: Annotated[
+        int | None,
+        typer.Option("--quality", metavar="1..100", help="Of JPEG and WebP; 92 if not given, 100 loses nothing."),
+    ] = None
+    transparent: Annotated[bool, typer.Option("--transparent", help="Leave out what lies behind all objects.")] = False
+    layers: Annotated[
+        bool,
+        typer.Option("--layers", help="Write an EXR of what the picture is made of: reflections, depth, normals, ..."),
+    ] = False
 
-    path: Path
-    exposure: float | None
-    tone_mapping: str | None
-    bits: int | None
-    quality: int | None
-    is_transparent: bool
-    has_layers: bool
+    def checked_path(self, scene: Path) -> Path:
+        """The file that is written of a scene's frame, checked before any work is spent on it.
 
-    def __post_init__(self) -> None:
-        check_layers_writable(self.path) if self.has_layers else check_writable(self.path)
-        PictureFormat.checked(self.path, **self._given)
-        if self.is_transparent and self.path.suffix.lower() in JPEG:
-            raise InputError(f"{self.path}: a JPEG cannot be transparent, PNG, WebP and EXR can")
+        Raises:
+            InputError: it cannot be written, or an option is not allowed, or not for such a file.
+        """
+        path = self.output or Path(scene.stem + (".exr" if self.layers else ".png"))
+        check_layers_writable(path) if self.layers else check_writable(path)
+        PictureFormat.checked(path, **self._given)
+        if self.transparent and path.suffix.lower() in JPEG:
+            raise InputError(f"{path}: a JPEG cannot be transparent, PNG, WebP and EXR can")
+        return path
 
     @property
     def _given(self) -> dict[str, Any]:
@@ -77,10 +79,10 @@ class PictureOptions:
             return scene
         return dataclasses.replace(scene, picture=dataclasses.replace(scene.picture, **self._development))
 
-    def write(self, frame: Frame, picture: Picture) -> None:
+    def write(self, path: Path, frame: Frame, picture: Picture) -> None:
         """Write a frame, developed as its scene's ``picture`` says; an EXR holds the radiance as it is."""
-        if self.has_layers:
-            save_layers(self.path, frame.layers(cutout=self.is_transparent))
+        if self.layers:
+            save_layers(path, frame.layers(cutout=self.transparent))
             return
-        by_scene = {} if self.path.suffix.lower() == ".exr" else dataclasses.asdict(picture)
-        save_image(self.path, frame.cutout if self.is_transparent else frame.image, **(self._given | by_scene))
+        by_scene = {} if path.suffix.lower() == ".exr" else dataclasses.asdict(picture)
+        save_image(path, frame.cutout if self.transparent else frame.image, **(self._given | by_scene))

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from ldtrefl.base.errors import InputError
-from ldtrefl.cli.options import mesh_or_shape, parsed_settings, parsed_size, scene_of
+from ldtrefl.cli.options import SceneWanted, mesh_or_shape, parsed_settings, parsed_size
 from tests.conftest import SMALL_SCENE
 
 
@@ -52,15 +52,15 @@ def test_another_way_to_write_a_size_is_refused(size: str) -> None:
 def test_a_scene_file_takes_a_size_and_nothing_else(tmp_path: Path) -> None:
     path = tmp_path / "scene.toml"
     path.write_text(SMALL_SCENE)
-    camera = scene_of(path, size="10x20").camera
+    camera = SceneWanted(path, size="10x20").loaded().camera
     assert (camera.width, camera.height, camera.eye) == (10, 20, (0.0, -5.0, 1.0))
     for options in ({"on": "studio"}, {"up": "y"}, {"mirror": "self"}):
         with pytest.raises(InputError, match=r"scene\.toml: '\w+' goes with a mesh file, this is a scene file"):
-            scene_of(path, **options)
+            SceneWanted(path, **options).loaded()
     with pytest.raises(InputError, match=r"size: should be width and height, .* got \(99999, 2\)"):
-        scene_of(path, size="99999x2")
+        SceneWanted(path, size="99999x2").loaded()
 
 
 def test_only_the_mesh_itself_can_be_made_a_mirror(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="--mirror all: only 'self' is allowed"):
-        scene_of(tmp_path / "a.ply", mirror="all")
+        SceneWanted(tmp_path / "a.ply", mirror="all").loaded()

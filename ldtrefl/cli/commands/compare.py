@@ -9,22 +9,8 @@ from typing import Annotated
 import typer
 
 from ldtrefl.base.errors import InputError, printable
-from ldtrefl.cli.options import (
-    Device,
-    Lenient,
-    Memory,
-    Mirror,
-    On,
-    Samples,
-    SceneFile,
-    Size,
-    Threads,
-    Turn,
-    Up,
-    parsed_settings,
-    scene_of,
-    use_resources,
-)
+from ldtrefl.cli.option_groups import grouped
+from ldtrefl.cli.options import Resources, Samples, SceneWanted, parsed_settings
 from ldtrefl.cli.printing import say, stage_times
 from ldtrefl.cli.progress import progress_bar
 from ldtrefl.compare.bounces import bounce_table
@@ -47,8 +33,9 @@ app = typer.Typer()
 
 
 @app.command()
+@grouped
 def compare(
-    scene: SceneFile,
+    wanted: SceneWanted,
     methods: Annotated[str, typer.Option(help="Method names, comma-separated.")] = "ldt,envmap",
     reference: Annotated[str, typer.Option(help="The method that counts as the truth.")] = "bvh",
     output: Annotated[
@@ -58,23 +45,17 @@ def compare(
     settings: Annotated[
         list[str] | None, typer.Option("--set", metavar="METHOD.OPTION=VALUE", help="An option of one method.")
     ] = None,
-    on: On = None,
-    up: Up = None,
-    turn: Turn = 0.0,
-    mirror: Mirror = None,
-    size: Size = None,
     samples: Samples = None,
     reference_samples: Annotated[
         int | None,
         typer.Option(min=1, max=MAX_SAMPLES, help="The same of the truth; as many as the others if not given."),
     ] = None,
-    lenient: Lenient = False,
-    device: Device = None,
-    threads: Threads = None,
-    memory: Memory = None,
+    *,
+    resources: Resources,
 ) -> None:
     """Render a scene, or a mesh, by several methods; print errors and write images and difference pictures."""
-    use_resources(memory, threads)
+    resources.use()
+    device, scene = resources.device, wanted.scene
     foresee_a_frame(device)
     names = [name.strip() for name in methods.split(",") if name.strip()]
     options = _options_by_method(settings, [reference, *names])
@@ -82,7 +63,7 @@ def compare(
         if count is not None:
             options[name] = {**options[name], "samples": count}
     folder = writable_folder(output or Path(scene.stem + "-compare"), make=True)
-    loaded = scene_of(scene, on, up, turn, mirror, size, lenient)
+    loaded = wanted.loaded()
     rows: dict[str, Row] = {}
     with progress_bar():
         _, truth = timed_frame(loaded, reference, device, options[reference])

@@ -8,7 +8,8 @@ from typing import Annotated
 
 import typer
 
-from ldtrefl.cli.options import Device, Memory, Threads, mesh_or_shape, use_resources
+from ldtrefl.cli.option_groups import grouped
+from ldtrefl.cli.options import Resources, mesh_or_shape
 from ldtrefl.cli.printing import say
 from ldtrefl.compare.layer_picture import draw_layers
 from ldtrefl.device.launch import resolve_device
@@ -26,18 +27,18 @@ app = typer.Typer()
 
 
 @app.command()
+@grouped
 def peel(
     mesh: Annotated[str, typer.Argument(metavar="MESH", help="A mesh file, or the name of a procedural shape.")],
     output: Annotated[Path | None, typer.Option("-o", "--output", help="Draw the layers to this picture.")] = None,
     resolution: Annotated[int, typer.Option(help="Texels along the longest side.")] = DEFAULT_RESOLUTION,
-    device: Device = None,
-    threads: Threads = None,
-    memory: Memory = None,
+    *,
+    resources: Resources,
 ) -> None:
     """Look at a layered depth texture: layers per face, fragments, bytes and time."""
-    use_resources(memory, threads)
+    resources.use()
     path = None if output is None else check_writable(output)
-    target = resolve_device(device)
+    target = resolve_device(resources.device)
     geometry = DeviceMesh(mesh_or_shape(mesh), target)
     peel_mesh(geometry, SMALLEST_RESOLUTION, search="linear")  # compiles, so that the time below is peeling's own
     start = time.perf_counter()
