@@ -10,10 +10,10 @@ comes with ``pip install -e .[peers]``, and needs an LLVM library of version 16 
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
+import functools
 import importlib
-import json
+import itertools
 import statistics
 import sys
 import time
@@ -27,12 +27,12 @@ from benchmark_parts.frame_scenes import moving
 from mitsuba_parts.emission_only import emission_only
 from mitsuba_parts.mirror_paths import NO_ROULETTE
 from mitsuba_parts.mitsuba_scene import camera_place, mitsuba, mitsuba_scene, sampling_camera
+from mitsuba_parts.outcome import RESULTS, arguments, write_report
 
 import ldtrefl
 from ldtrefl.base.errors import InputError
 from ldtrefl.compare.metrics import flip
 from ldtrefl.device.launch import thread_count
-from ldtrefl.files.atomic_write import written_whole
 from ldtrefl.frame.sample_pattern import DEVIATION
 from ldtrefl.scene.description import Camera, Scene
 
@@ -71,6 +71,14 @@ class MitsubaSampled:
         self._place["to_world"] = camera_place(self._mi, camera)
         self._place.update()
         return np.array(self._path.render(self._scene, self._sensor, spp=samples, seed=seed))
+
+    def counts(self) -> Iterator[int]:
+        """The numbers of samples, from 2 on, that its sampler takes as they are: others it rounds up."""
+        sampler = self._sensor.sampler()
+        for count in itertools.count(2):
+            sampler.set_sample_count(count)
+            if sampler.sample_count() == count:
+                yield count
 
     def truth(self, camera: Camera, samples: int) -> np.ndarray:
         """(h, w, 3) float32: the mean of pictures with other samples each."""
@@ -120,14 +128,14 @@ def compared(name: str, scene: Scene, true_samples: int, folder: Path | None) ->
     theirs, renderer = MitsubaSampled(scene), ldtrefl.Renderer(scene, "ldt")
     ours = seconds_of(renderer.render, moving(scene.camera), ROUNDS)
     samples, their_seconds = 1, seconds_of(lambda camera: theirs.picture(camera, 1), moving(scene.camera), ROUNDS)
-    while True:
-        more = seconds_of(lambda camera: theirs.picture(camera, samples + 1), moving(scene.camera), ROUNDS)  # noqa: B023
+    for count in theirs.counts():
+        more = seconds_of(functools.partial(theirs.picture, samples=count), moving(scene.camera), ROUNDS)
         if more > ours:
             break
-        samples, their_seconds = samples + 1, more
+        samples, their_seconds = count, more
     frame, truth = renderer.render(scene.camera), theirs.truth(scene.camera, true_samples)
     picture = theirs.picture(scene.camera, samples)
-    if folder is not None:
+    if folder not in (None, RESULTS):
         for kind, image in (("ours", frame.image), ("mitsuba", picture), ("truth", truth)):
             ldtrefl.save_image(folder / f"{name}-{kind}.png", image)
     mean = float(frame.sample_counts.mean())
@@ -159,37 +167,27 @@ be {MOST_SHARE:g} of Mitsuba's.
 
 
 def main() -> int:
-    """Compare, and write what was found."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("-o", "--output", type=Path, help="folder for the table and all pictures")
-    parser.add_argument("--only", help="one scene, the table on the screen")
-    parser.add_argument("--quick", action="store_true", help="small pictures, on the screen")
-    given = parser.parse_args()
-    try:
-        mitsuba()
-    except InputError as error:
-        print(error, file=sys.stderr)
-        return 2
+    """Compare the scenes that are wanted, and write the report."""
+    given = arguments(__doc__, SCENES, "small pictures, and a truth of few samples")
+    version = mitsuba().__version__
     rows = []
-    for name in [given.only] if given.only else SCENES:
+    for name in given.only or SCENES:
         scene = ldtrefl.load_scene(ROOT / "scenes" / f"{name}.toml")
         if given.quick:
             width, height = QUICK_SIZE
             scene = scene.with_camera(dataclasses.replace(scene.camera, width=width, height=height))
         rows.append(compared(name, scene, SAMPLES_AT_ONCE if given.quick else TRUE_SAMPLES, given.output))
-        print(table(rows[-1:]).splitlines()[-1], flush=True)
-    if given.only or given.quick:
-        print(table(rows))
-        return int(not all(row.passed for row in rows))
-    folder = given.output or ROOT / "tools" / "results"
-    head = f"# Pictures in equal time\n\n{len(rows)} scenes, {sum(not row.passed for row in rows)} beyond the limit; "
-    text = f"{head}Mitsuba {mitsuba().__version__}.\n\n{EXPLANATION}\n{table(rows)}"
-    values = [dataclasses.asdict(row) for row in rows]
-    for file, content in (("equal_time.md", text), ("equal_time.json", json.dumps(values, indent=1) + "\n")):
-        with written_whole(folder / file) as scratch:
-            scratch.write_text(content)
-    return int(not all(row.passed for row in rows))
+        print(f"{name}: {rows[-1].error / rows[-1].their_error:.2f}", flush=True)
+    beyond = sum(not row.passed for row in rows)
+    head = f"{len(rows)} scenes, {beyond} beyond the limit; Mitsuba {version}."
+    write_report(
+        given.output, "equal_time", f"# Pictures in equal time\n\n{head}\n\n{EXPLANATION}\n{table(rows)}", rows
+    )
+    return 1 if beyond else 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    try:
+        sys.exit(main())
+    except InputError as error:
+        sys.exit(f"equal_time.py: {error}")

@@ -11,22 +11,19 @@ scene is beyond its limit.
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
-import json
 import sys
 from pathlib import Path
-from typing import Any
 
 from mitsuba_parts.emission_only import emission_only
 from mitsuba_parts.judge import MOST_OFF, OFF, Judgement, judgement
 from mitsuba_parts.mirror_paths import MitsubaPictures
 from mitsuba_parts.mitsuba_scene import ENVIRONMENT_ROWS, VARIANT, mitsuba
+from mitsuba_parts.outcome import arguments, write_report
 from mitsuba_parts.pixel_rays import SMALL_LIFT
 
 import ldtrefl
 from ldtrefl.base.errors import InputError
-from ldtrefl.files.atomic_write import written_whole
 
 ROOT = Path(__file__).parent.parent
 BOUNCES = 8
@@ -105,10 +102,10 @@ def report(judgements: list[Judgement], left_out: list[str]) -> str:
 
 def main() -> int:
     """Compare the scenes that are wanted, and write the report."""
-    arguments = _arguments()
+    given = arguments(__doc__, shipped(), f"pictures of {QUICK_SIZE[0]} x {QUICK_SIZE[1]} pixels")
     mitsuba()
     judgements, left_out = [], []
-    for name in arguments.only or shipped():
+    for name in given.only or shipped():
         try:
             scene = ldtrefl.load_scene(shipped()[name])
         except InputError as error:
@@ -116,33 +113,15 @@ def main() -> int:
                 raise
             left_out.append(name)
             continue
-        if arguments.quick:
+        if given.quick:
             width, height = QUICK_SIZE
             scene = scene.with_camera(dataclasses.replace(scene.camera, width=width, height=height))
         judgements.append(judged(name, scene))
         last = judgements[-1]
         print(f"{name}: {last.off} of {last.judged} off{'' if last.passed else ', beyond the limit'}", flush=True)
     page = report(judgements, left_out)
-    if arguments.output is None:
-        print(page)
-    else:
-        arguments.output.mkdir(parents=True, exist_ok=True)
-        rows: list[dict[str, Any]] = [dataclasses.asdict(j) for j in judgements]
-        for file, text in (("mitsuba.json", json.dumps(rows, indent=1)), ("mitsuba.md", page)):
-            with written_whole(arguments.output / file) as scratch:
-                scratch.write_text(text)
+    write_report(given.output, "mitsuba", page, judgements)
     return 1 if any(not j.passed for j in judgements) else 0
-
-
-def _arguments() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help=f"pictures of {QUICK_SIZE[0]} x {QUICK_SIZE[1]} pixels")
-    parser.add_argument("--only", choices=shipped(), action="append", help="this scene alone; may be repeated")
-    parser.add_argument("-o", "--output", type=Path, help="folder to write to; default of a full run: tools/results")
-    arguments = parser.parse_args()
-    if arguments.output is None and not (arguments.quick or arguments.only):
-        arguments.output = ROOT / "tools" / "results"
-    return arguments
 
 
 if __name__ == "__main__":

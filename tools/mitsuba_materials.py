@@ -10,9 +10,6 @@ left out. Exit status 1 if a scene is beyond its limit.
 
 from __future__ import annotations
 
-import argparse
-import dataclasses
-import json
 import os
 import sys
 from collections.abc import Callable
@@ -24,11 +21,11 @@ from mitsuba_parts import material_scenes
 from mitsuba_parts.lit_pictures import LitPictures
 from mitsuba_parts.material_scenes import MaterialScene
 from mitsuba_parts.mitsuba_scene import mitsuba
+from mitsuba_parts.outcome import arguments, write_report
 
 import ldtrefl
 from ldtrefl.base.errors import InputError
 from ldtrefl.compare.metrics.structural_similarity import ssim
-from ldtrefl.files.atomic_write import written_whole
 from ldtrefl.shading.finish import LEAST_ROUGHNESS
 
 ROOT = Path(__file__).parent.parent
@@ -154,38 +151,19 @@ def made(name: str, width: int) -> MaterialScene | None:
 
 def main() -> int:
     """Compare the scenes that are wanted, and write the report."""
-    arguments = _arguments()
+    given = arguments(__doc__, [*SCENES, *FILES], f"pictures {QUICK_WIDTH} pixels wide")
     mitsuba()
     rows, left_out = [], []
-    for name in arguments.only or [*SCENES, *FILES]:
-        case = made(name, QUICK_WIDTH if arguments.quick else WIDTH)
+    for name in given.only or [*SCENES, *FILES]:
+        case = made(name, QUICK_WIDTH if given.quick else WIDTH)
         if case is None:
             left_out.append(name)
             continue
         rows.append(compared(name, case))
         print(f"{name}: {rows[-1].of_layers.ssim:.4f}", flush=True)
     page = report(rows, left_out)
-    if arguments.output is None:
-        print(page)
-    else:
-        arguments.output.mkdir(parents=True, exist_ok=True)
-        figures = json.dumps([dataclasses.asdict(row) for row in rows], indent=1)
-        for ending, text in (("json", figures), ("md", page)):
-            with written_whole(arguments.output / f"mitsuba_materials.{ending}") as scratch:
-                scratch.write_text(text)
+    write_report(given.output, "mitsuba_materials", page, rows)
     return 1 if any(not row.of_layers.passed for row in rows) else 0
-
-
-def _arguments() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help=f"pictures {QUICK_WIDTH} pixels wide")
-    names = [*SCENES, *FILES]
-    parser.add_argument("--only", choices=names, action="append", help="this scene alone; may be repeated")
-    parser.add_argument("-o", "--output", type=Path, help="folder to write to; default of a full run: tools/results")
-    arguments = parser.parse_args()
-    if arguments.output is None and not (arguments.quick or arguments.only):
-        arguments.output = ROOT / "tools" / "results"
-    return arguments
 
 
 if __name__ == "__main__":
