@@ -178,6 +178,7 @@ def room_of_test(path: str) -> str:
     return str(inside) if inside.parts[:1] == ("tools",) else str("ldtrefl" / inside)
 
 
+@functools.cache
 def module_under_test(path: str) -> str | None:
     """The module that a test is named after: of ``test_pictures.py`` and ``test_pictures_written.py`` ``pictures``."""
     name = Path(path).stem.removeprefix("test_") + "_"
