@@ -29,7 +29,7 @@ from ldtrefl.frame.skip_options import SkipOptions
 from ldtrefl.frame.taken_rays import taken
 from ldtrefl.geometry.footprint import Footprint
 from ldtrefl.geometry.vectors import point_along
-from ldtrefl.shading.ray_footprint import meet
+from ldtrefl.shading.ray_footprint import is_textured, meet
 from ldtrefl.shading.surface import Surface, extended_coordinates
 from ldtrefl.shading.surfaces import GROUP, Sighting, look_along
 from ldtrefl.tracing.closest_hits import closest_hits_kernel
@@ -97,7 +97,7 @@ def add_brought(radiance: wp.array(dtype=wp.vec3), numbers: wp.array(dtype=wp.in
 @launch.once
 def shade_hits_kernel(tracer: Tracer, features: ShadingFeatures) -> wp.Kernel:
     """The kernel that adds what rays met to what they bring, and sends them on from mirrors."""
-    shaded, light_met = shaded_by(tracer, features), meeting_lights(features.visible_lights)
+    shaded, light_met = shaded_by(tracer, features), meeting_lights(features.soft_light)
     with_footprints = wp.constant(features.footprints)
 
     @launch.kernel
@@ -143,7 +143,8 @@ def shade_hits_kernel(tracer: Tracer, features: ShadingFeatures) -> wp.Kernel:
                 i = begin + lane
                 surfaces[lane].position = placed_on_ray(objects, rays, hits, i, surfaces[lane].position)
                 met = Footprint()
-                if with_footprints:
+                k = surfaces[lane].object
+                if with_footprints and (objects[k].reflects != 0 or is_textured(objects, k)):
                     met = meet(objects, rays.footprint[i], hits.t[i], surfaces[lane], sightings, lane)
                 place = pattern_place(gbuffer, rays.pixel[i])
                 leaving = shaded(views, objects, top, lighting, looks, sightings, lane, surfaces, place)

@@ -44,7 +44,7 @@ def light_before(
 @launch.once
 def shade_pixels_kernel(tracer: Tracer, features: ShadingFeatures) -> wp.Kernel:
     """The kernel that shades what the camera sees, reflectors left out."""
-    shaded, with_visible_lights = shaded_by(tracer, features), wp.constant(features.visible_lights)
+    shaded, with_visible_lights = shaded_by(tracer, features), wp.constant(features.soft_light)
     filters = wp.constant(features.probes > 0)
 
     @launch.kernel
@@ -86,7 +86,7 @@ def shade_pixels_kernel(tracer: Tracer, features: ShadingFeatures) -> wp.Kernel:
                 lane = lowest_bit(wp.uint64(lanes))
                 lanes = lanes & (lanes - 1)
                 if filters:
-                    if is_textured(objects[surfaces[lane].object]):
+                    if is_textured(objects, surfaces[lane].object):
                         meet_from_eye(gbuffer.camera, objects, surfaces[lane], sightings, lane)
                 light = int(-1)
                 if with_visible_lights:
@@ -131,7 +131,7 @@ def shade_reflectors_kernel(tracer: Tracer, starts_rays: bool, features: Shading
     """The kernel that shades the pixels that see a reflector, without what it reflects, and starts their rays if
     ``starts_rays``; with their footprints, if the scene has textures that are filtered."""
     shaded, with_rays = shaded_by(tracer, features), wp.constant(starts_rays)
-    with_visible_lights, with_footprints = wp.constant(features.visible_lights), wp.constant(features.footprints)
+    with_visible_lights, with_footprints = wp.constant(features.soft_light), wp.constant(features.footprints)
 
     @launch.kernel
     def shade_reflectors(

@@ -160,27 +160,54 @@ struct Pictures {
         return made;
     }
 
+    // The texels on both sides of a coordinate in parts of a picture, and how near to the later one it is.
+    SHARED void neighbours(float s, int count, int wrap, int& before, int& after, float& share) {
+        if (wrap == REPEAT) {  // most are read so, and it takes less
+            const float x = (s - floorf(s)) * (float)count + 0.5f;
+            after = (int)x;
+            share = x - (float)after;
+            before = after > 0 ? after - 1 : count - 1;
+            if (after >= count) after = 0;
+            return;
+        }
+        const float x = in_texels(s, count, wrap) - 0.5f, left = floorf(x);
+        share = x - left;
+        before = wrapped((int)left, count, wrap);
+        after = wrapped((int)left + 1, count, wrap);
+    }
+
+    // Add the probes in a row, each of four texels, blended, and counting as a tent says. The row's middle is at (s, t).
+    APART void add_probes(const Picture& of, const Covered& by, float s, float t, float counts, Texel& total) {
+        const float step = 1.0f / (float)by.probes;
+        for (int i = 0; i < by.probes; ++i) {
+            const float along = ((float)i + 0.5f) * step - 0.5f;
+            int left, right, above, below;
+            float x, y;
+            neighbours(s + along * by.long_s, of.width, of.wrap_u, left, right, x);
+            neighbours(t + along * by.long_t, of.height, of.wrap_v, above, below, y);
+            const float part = counts * (1.0f - fabsf(2.0f * along));
+            const float upper = part * (1.0f - y), lower = part * y;
+            add(total, upper * (1.0f - x), texel(of, left, above));
+            add(total, upper * x, texel(of, right, above));
+            add(total, lower * (1.0f - x), texel(of, left, below));
+            add(total, lower * x, texel(of, right, below));
+        }
+    }
+
     // The mean of a picture's colour and alpha about (u, v), over what a filter covers.
     APART Texel mean_over(const Picture& of, float u, float v, const float* change) {
         const Covered by = covered_by(of, change);
         if (!(by.level > 0.0f) && by.probes == 1) return sample(of, u, v);
-        const float above = larger(by.level, 0.0f);
-        const int level = (int)above;
-        const Picture fine = halved(of, level), coarse = halved(of, level + 1);
-        const float share = above - (float)level;
+        const float level = floorf(larger(by.level, 0.0f)), share = larger(by.level, 0.0f) - level;
         float s, t;
         place_of(of, u, v, s, t);
+        s = clamped(s, -FARTHEST, FARTHEST);
+        t = clamped(t, -FARTHEST, FARTHEST);
         Texel total = {0.0f, 0.0f, 0.0f, 0.0f};
-        float weight = 0.0f;
-        for (int i = 0; i < by.probes; ++i) {
-            const float along = ((float)i + 0.5f) / (float)by.probes - 0.5f;
-            const float at_s = s + along * by.long_s, at_t = t + along * by.long_t;
-            const float counts = 1.0f - fabsf(2.0f * along);  // a tent
-            weight += counts;
-            add(total, counts * (1.0f - share), blended_at(fine, at_s, at_t));
-            if (share > 0.0f) add(total, counts * share, blended_at(coarse, at_s, at_t));
-        }
-        const float part = 1.0f / weight;
+        add_probes(halved(of, (int)level), by, s, t, 1.0f - share, total);
+        if (share > 0.0f) add_probes(halved(of, (int)level + 1), by, s, t, share, total);
+        // What a tent is at so many places in a row sums up to half of their number, and a little more if that is odd.
+        const float count = (float)by.probes, part = 2.0f * count / (count * count + (float)(by.probes & 1));
         return {part * total.x, part * total.y, part * total.z, part * total.w};
     }
 };

@@ -121,9 +121,7 @@ def make_share_seen(share_lit: Callable[..., float]) -> Callable[..., float]:
 def make_soft_light(share_lit: Callable[..., float], features: ShadingFeatures) -> Callable[..., Lit]:
     """``soft_light(views, objects, top, lighting, looks, surface, normal, finishes, pixel)``: what shaped lights make
     of a surface, and the share of ambient light; the first of ``finishes`` counts only if there are looks."""
-    with_looks, with_shadows = wp.constant(features.looks), wp.constant(features.shadows)
-    with_rays, share_seen = wp.constant(features.shadows or features.occlusion), make_share_seen(share_lit)
-    first = wp.constant(-1 if features.occlusion else 0)
+    with_looks, share_seen = wp.constant(features.looks), make_share_seen(share_lit)
 
     @wp.func
     def soft_light(
@@ -139,6 +137,7 @@ def make_soft_light(share_lit: Callable[..., float], features: ShadingFeatures) 
     ) -> Lit:
         lit = Lit()
         lit.ambient = 1.0
+        first = wp.where(lighting.occlusion_samples > 0, -1, 0)
         for i in range(first, lighting.shaped.shape[0]):
             offset = wp.vec3(0.0)
             factor = float(1.0)
@@ -146,9 +145,8 @@ def make_soft_light(share_lit: Callable[..., float], features: ShadingFeatures) 
                 offset = from_to(surface.position, lighting.shaped[i].position)
                 factor = unshadowed(lighting.shaped[i], offset, normal)
             share = float(1.0)
-            if with_rays:
-                if factor > 0.0 and (i < 0 or with_shadows):
-                    share = share_seen(views, objects, top, lighting, looks, surface, normal, i, offset, pixel)
+            if factor > 0.0 and (i < 0 or lighting.shadows != 0):
+                share = share_seen(views, objects, top, lighting, looks, surface, normal, i, offset, pixel)
             if i < 0:
                 lit.ambient = share
             elif factor > 0.0 and share > 0.0:

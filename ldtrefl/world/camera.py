@@ -16,6 +16,7 @@ import numpy as np
 import warp as wp
 
 from ldtrefl.geometry.footprint import Footprint
+from ldtrefl.geometry.vectors import as_single
 from ldtrefl.scene.description import Camera
 
 BLENDED = 0.6
@@ -67,20 +68,17 @@ def pixel_place(camera: CameraView, pixel: int) -> wp.vec2i:
 
 
 @wp.func
-def turned_by(way: wp.vec3d, change: wp.vec3d) -> wp.vec3:
-    """From the unit direction along ``way`` to that along ``way + change``, to first order."""
-    along = wp.normalize(way)
-    turn = (change - wp.dot(change, along) * along) / wp.length(way)
-    return wp.vec3(float(turn[0]), float(turn[1]), float(turn[2]))
-
-
-@wp.func
 def camera_footprint(camera: CameraView, way: wp.vec3d) -> Footprint:
     """The footprint at the eye of the ray along ``way``, as :func:`camera_ray` gives it (Igehy 1999, equation 8)."""
+    along = as_single(way)
+    length = wp.length(along)
+    along = along / length
+    reach = 2.0 * camera.spacing / length
+    right = (reach / float(camera.width)) * as_single(camera.right)
+    down = (reach / float(camera.height)) * as_single(camera.down)
     footprint = Footprint()
-    reach = wp.float64(2.0 * camera.spacing)
-    footprint.turn_x = turned_by(way, (reach / wp.float64(camera.width)) * camera.right)
-    footprint.turn_y = turned_by(way, (reach / wp.float64(camera.height)) * camera.down)
+    footprint.turn_x = right - wp.dot(right, along) * along
+    footprint.turn_y = down - wp.dot(down, along) * along
     return footprint
 
 

@@ -195,14 +195,12 @@ class DeviceScene:
     def features(self) -> ShadingFeatures:
         """What kernels are built for."""
         probes = self._uploads.probes if any(mesh.has_textures for mesh in self.meshes) else 0
-        lighting, shaped = self.scene.lighting, [light for light in self.scene.lights if light.kind in SHAPED]
+        lighting = self.scene.lighting
         return ShadingFeatures(
             looks=bool((self._records["look"] >= 0).any()),
             dimmed_shadows=lighting.is_traced and bool(self._looks.let_through(self._records["look"]).any()),
             shadows=lighting.shadows,
-            occlusion=lighting.occlusion is not None,
-            shaped_lights=bool(shaped),
-            visible_lights=any(light.visible and light.kind != "spot" for light in shaped),
+            soft_light=lighting.occlusion is not None or any(light.kind in SHAPED for light in self.scene.lights),
             probes=probes,
             footprints=self._uploads.needs_footprints or probes > 0,
         )

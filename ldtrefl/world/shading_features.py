@@ -15,23 +15,15 @@ class ShadingFeatures:
     """Whether any object lets light through, by the alpha of its look, that rays ask for."""
     shadows: bool = False
     """Whether lights cast shadows."""
-    occlusion: bool = False
-    """Whether ambient light is dimmed by what stands close."""
-    shaped_lights: bool = False
-    """Whether there are lights but directional ones and points."""
-    visible_lights: bool = False
-    """Whether the shapes of any are seen."""
+    soft_light: bool = False
+    """Whether there are lights but directional ones and points, or ambient light is dimmed by what stands close: several
+    rays may then be asked from each point, and lights be seen."""
 
     probes: int = 0
     """The most probes by which a texture is filtered; 0: textures are not filtered, or there are none."""
     footprints: bool = False
     """Whether rays carry their footprints."""
 
-    @property
-    def soft_light(self) -> bool:
-        """Whether any light may need several rays from each point."""
-        return self.occlusion or self.shaped_lights
-
     def without_rays(self) -> ShadingFeatures:
         """The same where nothing is asked of a tracer."""
-        return replace(self, dimmed_shadows=False, shadows=False, occlusion=False)
+        return replace(self, dimmed_shadows=False, shadows=False)

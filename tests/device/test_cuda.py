@@ -25,11 +25,11 @@ has a fault in some versions."""
 
 
 SHADOWS = ShadingFeatures(shadows=True)
-EVERYTHING = ShadingFeatures(*[True] * 6, probes=16, footprints=True)
+EVERYTHING = ShadingFeatures(*[True] * 4, probes=16, footprints=True)
 SHADED = (
     (NOTHING, ShadingFeatures()),
     (NOTHING, ShadingFeatures(looks=True)),
-    (NOTHING, ShadingFeatures(shaped_lights=True, visible_lights=True)),
+    (NOTHING, ShadingFeatures(soft_light=True)),
     (NOTHING, ShadingFeatures(probes=16, footprints=True)),
     *((tracer, SHADOWS) for tracer in (BVH, *TRACERS.values())),
     (TRACERS["exact"], ShadingFeatures(looks=True, shadows=True, dimmed_shadows=True)),

@@ -17,7 +17,7 @@ def features(*lights: Light, **lighting: object) -> ShadingFeatures:
     scene = Scene(camera=camera, objects=(Object(shape="box"),), lights=lights, lighting=Lighting(**lighting))
     device_scene = DeviceScene(scene, launch.resolve_device("cpu"))
     has_noise = np.array(device_scene.lighting.noise.shape).all()
-    assert has_noise == (device_scene.features.shaped_lights or device_scene.features.occlusion)
+    assert has_noise == device_scene.features.soft_light
     return device_scene.features
 
 
@@ -25,13 +25,10 @@ def test_a_scene_has_what_it_says_and_no_more() -> None:
     sun = Light(kind="directional", direction=(0, 0, -1), radiance=1.0)
     assert features(sun) == ShadingFeatures()
     assert features(sun, shadows=True) == ShadingFeatures(shadows=True)
-    assert features(occlusion={"distance": 1.0}) == ShadingFeatures(occlusion=True)
-    assert features(SPOT, sun) == ShadingFeatures(shaped_lights=True)
-    assert features(BALL) == ShadingFeatures(shaped_lights=True, visible_lights=True)
-    hidden = Light(kind="sphere", position=(0, 0, 3), radius=0.1, radiance=1.0, visible=False)
-    assert features(hidden) == ShadingFeatures(shaped_lights=True)
+    for soft in (features(occlusion={"distance": 1.0}), features(SPOT, sun), features(BALL)):
+        assert soft == ShadingFeatures(soft_light=True)
 
 
 def test_where_nothing_is_traced_lights_stay() -> None:
-    everything = ShadingFeatures(True, True, True, True, True, True)
-    assert everything.without_rays() == ShadingFeatures(looks=True, shaped_lights=True, visible_lights=True)
+    everything = ShadingFeatures(True, True, True, True)
+    assert everything.without_rays() == ShadingFeatures(looks=True, soft_light=True)
