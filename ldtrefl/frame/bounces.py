@@ -27,9 +27,8 @@ from ldtrefl.frame.regions import Regions
 from ldtrefl.frame.shadows import shaded_by
 from ldtrefl.frame.skip_options import SkipOptions
 from ldtrefl.frame.taken_rays import taken
-from ldtrefl.geometry.footprint import Footprint
 from ldtrefl.geometry.vectors import point_along
-from ldtrefl.shading.ray_footprint import is_textured, meet
+from ldtrefl.shading.ray_footprint import meet_along
 from ldtrefl.shading.surface import Surface, extended_coordinates
 from ldtrefl.shading.surfaces import GROUP, Sighting, look_along
 from ldtrefl.tracing.closest_hits import closest_hits_kernel
@@ -72,6 +71,9 @@ def sight_hit(
     sightings[lane].u = uv[0]
     sightings[lane].v = uv[1]
     sightings[lane].view = rays.direction[i]
+    if rays.footprint.shape[0] > 0:
+        sightings[lane].t = hits.t[i]
+        sightings[lane].footprint = rays.footprint[i]
 
 
 @wp.func
@@ -137,21 +139,19 @@ def shade_hits_kernel(tracer: Tracer, features: ShadingFeatures) -> wp.Kernel:
                     else:
                         add_brought(radiance, numbers, i, brought_by(lighting, rays, i, light))
             look_along(objects, lanes, sightings, surfaces)
+            if with_footprints:
+                meet_along(objects, lanes, sightings, surfaces)
             while lanes != 0:
                 lane = lowest_bit(wp.uint64(lanes))
                 lanes = lanes & (lanes - 1)
                 i = begin + lane
                 surfaces[lane].position = placed_on_ray(objects, rays, hits, i, surfaces[lane].position)
-                met = Footprint()
-                k = surfaces[lane].object
-                if with_footprints and (objects[k].reflects != 0 or is_textured(objects, k)):
-                    met = meet(objects, rays.footprint[i], hits.t[i], surfaces[lane], sightings, lane)
                 place = pattern_place(gbuffer, rays.pixel[i])
                 leaving = shaded(views, objects, top, lighting, looks, sightings, lane, surfaces, place)
                 if wp.max(surfaces[lane].mirror) > 0.0:
                     leaving += go_on(objects, lighting, rays, i, surfaces[lane], least_weight, onwards_out)
                     if with_footprints:
-                        carry_on(objects, met, surfaces[lane], sightings, lane, i, onwards_out)
+                        carry_on(surfaces[lane], sightings, lane, i, onwards_out)
                 add_brought(radiance, numbers, i, wp.cw_mul(rays.throughput[i], leaving))
             begin += GROUP
 

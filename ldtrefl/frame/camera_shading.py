@@ -9,16 +9,15 @@ from ldtrefl.device.bits import lowest_bit
 from ldtrefl.frame.backdrop import fill_backdrop, fill_lights
 from ldtrefl.frame.gbuffer import GBuffer, GBufferView, pattern_place, sight
 from ldtrefl.frame.shadows import shaded_by
-from ldtrefl.geometry.footprint import Footprint
 from ldtrefl.geometry.vectors import from_to
 from ldtrefl.shading.light_shapes import seen_light
-from ldtrefl.shading.ray_footprint import is_textured, leave, meet
+from ldtrefl.shading.ray_footprint import leave, meet_from
 from ldtrefl.shading.surface import Surface, may_return, way_onwards
 from ldtrefl.shading.surfaces import GROUP, Sighting, look_from
 from ldtrefl.tracing.nothing import no_shadows
 from ldtrefl.tracing.ray_buffers import RayBuffer, empty_rays
 from ldtrefl.tracing.tracer import BoundTracer, Tracer, block_of
-from ldtrefl.world.camera import CameraView, camera_footprint
+from ldtrefl.world.camera import CameraView, step_down, step_right
 from ldtrefl.world.look_records import Looks
 from ldtrefl.world.records import LightingRecord, ObjectRecord
 from ldtrefl.world.shading_features import ShadingFeatures
@@ -65,6 +64,7 @@ def shade_pixels_kernel(tracer: Tracer, features: ShadingFeatures) -> wp.Kernel:
         sight_memory, surface_memory = wp.zeros(shape=GROUP, dtype=Sighting), wp.zeros(shape=GROUP, dtype=Surface)
         sightings = wp.array(ptr=sight_memory.ptr, shape=(GROUP,), dtype=Sighting)
         surfaces = wp.array(ptr=surface_memory.ptr, shape=(GROUP,), dtype=Surface)
+        camera, to_right, to_below = gbuffer.camera, step_right(gbuffer.camera), step_down(gbuffer.camera)
         i = block * (first + wp.tid())
         end = wp.min(i + block, radiance_out.shape[0])
         while i < end:
@@ -81,16 +81,15 @@ def shade_pixels_kernel(tracer: Tracer, features: ShadingFeatures) -> wp.Kernel:
                     sight(gbuffer, i, sightings, i - begin)
                     lanes = lanes | (1 << (i - begin))
                 i += 1
-            look_from(objects, lanes, gbuffer.camera.eye, sightings, surfaces)
+            look_from(objects, lanes, camera.eye, sightings, surfaces)
+            if filters:
+                meet_from(objects, lanes, camera.eye, to_right, to_below, False, sightings, surfaces)
             while lanes != 0:
                 lane = lowest_bit(wp.uint64(lanes))
                 lanes = lanes & (lanes - 1)
-                if filters:
-                    if is_textured(objects, surfaces[lane].object):
-                        meet_from_eye(gbuffer.camera, objects, surfaces[lane], sightings, lane)
                 light = int(-1)
                 if with_visible_lights:
-                    light = light_before(gbuffer.camera, lighting, sightings, lane, surfaces)
+                    light = light_before(camera, lighting, sightings, lane, surfaces)
                 if light >= 0:
                     radiance_out[begin + lane] = lighting.shaped[light].radiance
                 else:
@@ -99,19 +98,6 @@ def shade_pixels_kernel(tracer: Tracer, features: ShadingFeatures) -> wp.Kernel:
                     radiance_out[begin + lane] = leaving
 
     return shade_pixels
-
-
-@wp.func
-def meet_from_eye(
-    camera: CameraView,
-    objects: wp.array(dtype=ObjectRecord),
-    surface: Surface,
-    sightings: wp.array(dtype=Sighting),
-    lane: int,
-) -> Footprint:
-    """The footprint of the camera's ray where it meets a lane's surface; the lane's spread is set."""
-    distance = wp.length(from_to(camera.eye, surface.position))
-    return meet(objects, camera_footprint(camera, sightings[lane].way), distance, surface, sightings, lane)
 
 
 @wp.func
@@ -154,22 +140,22 @@ def shade_reflectors_kernel(tracer: Tracer, starts_rays: bool, features: Shading
         sight_memory, surface_memory = wp.zeros(shape=GROUP, dtype=Sighting), wp.zeros(shape=GROUP, dtype=Surface)
         sightings = wp.array(ptr=sight_memory.ptr, shape=(GROUP,), dtype=Sighting)
         surfaces = wp.array(ptr=surface_memory.ptr, shape=(GROUP,), dtype=Surface)
+        camera, to_right, to_below = gbuffer.camera, step_right(gbuffer.camera), step_down(gbuffer.camera)
         begin = block * (first + wp.tid())
         end = wp.min(begin + block, pixels.shape[0])
         while begin < end:
             count = wp.min(GROUP, end - begin)
             for lane in range(count):
                 sight(gbuffer, pixels[begin + lane], sightings, lane)
-            look_from(objects, (1 << count) - 1, gbuffer.camera.eye, sightings, surfaces)
+            look_from(objects, (1 << count) - 1, camera.eye, sightings, surfaces)
+            if with_footprints:
+                meet_from(objects, (1 << count) - 1, camera.eye, to_right, to_below, True, sightings, surfaces)
             for lane in range(count):
                 pixel = pixels[begin + lane]
-                met = Footprint()
-                if with_footprints:
-                    met = meet_from_eye(gbuffer.camera, objects, surfaces[lane], sightings, lane)
                 place = pattern_place(gbuffer, pixel)
                 radiance_out[pixel] = shaded(views, objects, top, lighting, looks, sightings, lane, surfaces, place)
                 if with_visible_lights:
-                    light = light_before(gbuffer.camera, lighting, sightings, lane, surfaces)
+                    light = light_before(camera, lighting, sightings, lane, surfaces)
                     if light >= 0:  # it hides the mirror
                         radiance_out[pixel] = lighting.shaped[light].radiance
                         surfaces[lane].mirror = wp.vec3(0.0)
@@ -179,7 +165,7 @@ def shade_reflectors_kernel(tracer: Tracer, starts_rays: bool, features: Shading
                     start_ray(rays, begin + lane, objects, surfaces[lane], sightings[lane].view)
                     if with_footprints:
                         leaving = rays.direction[begin + lane]
-                        rays.footprint[begin + lane] = leave(objects, met, surfaces[lane], sightings, lane, leaving)
+                        rays.footprint[begin + lane] = leave(surfaces[lane], sightings, lane, leaving)
             begin += count
 
     return shade_reflectors

@@ -10,6 +10,8 @@ done in C++ (``contrast.h``).
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import warp as wp
 
@@ -19,16 +21,12 @@ from ldtrefl.frame.bounce_hits import FirstHits
 from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.pixel_order import pixels_in_blocks
 
-WITHIN = 0.12
-"""Difference on that scale from the mean of two neighbours that see the same objects, over the samples that a pixel may
-have to the power of ``FALLS``: who asks for many wants small differences to count."""
+WITHIN = 0.06
+"""Difference on that scale from the mean of two neighbours that see the same objects, over the root of the samples that
+a pixel may have: who asks for many wants small differences to count."""
 
-AT_EDGE = 0.08
+AT_EDGE = 0.04
 """The same from a neighbour that sees others."""
-
-FALLS = 0.75
-"""As the error of well-spread samples falls where an edge runs through a pixel: an edge lies in as many of its parts as
-the root of their number, by chance here or there in each."""
 
 VARIED = 0.08
 """The same between samples of a pixel."""
@@ -135,7 +133,7 @@ def pixels_of_contrast(gbuffer: GBuffer, hits: FirstHits | None, radiance: wp.ar
     """
     height, width = gbuffer.shape
     marked = wp.empty(height * width, dtype=wp.uint8, device=radiance.device)
-    fewer = samples**-FALLS
+    fewer = 1.0 / math.sqrt(samples)
     inputs = [width, radiance, objects_seen(gbuffer, hits), fewer * WITHIN, fewer * AT_EDGE, marked]
     launch.launch(mark_contrast, height, inputs, radiance.device)
     return pixels_in_blocks(marked.numpy().view(bool).reshape(height, width))

@@ -8,7 +8,6 @@ from collections.abc import Callable
 import warp as wp
 
 from ldtrefl.device import launch
-from ldtrefl.geometry.footprint import Footprint
 from ldtrefl.shading.environment import environment_radiance
 from ldtrefl.shading.light_shapes import seen_light
 from ldtrefl.shading.ray_footprint import leave
@@ -46,18 +45,10 @@ def go_on(
 
 
 @wp.func
-def carry_on(
-    objects: wp.array(dtype=ObjectRecord),
-    met: Footprint,
-    surface: Surface,
-    sightings: wp.array(dtype=Sighting),
-    lane: int,
-    i: int,
-    onwards_out: RayBuffer,
-):
-    """Let ray ``i`` have its footprint on from where it ``met`` a lane's surface, if it goes on."""
+def carry_on(surface: Surface, sightings: wp.array(dtype=Sighting), lane: int, i: int, onwards_out: RayBuffer):
+    """Let ray ``i`` have its footprint on from a lane's surface, if it goes on."""
     if onwards_out.source[i] >= 0:
-        onwards_out.footprint[i] = leave(objects, met, surface, sightings, lane, onwards_out.direction[i])
+        onwards_out.footprint[i] = leave(surface, sightings, lane, onwards_out.direction[i])
 
 
 @wp.func

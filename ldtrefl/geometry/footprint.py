@@ -11,10 +11,6 @@ from __future__ import annotations
 
 import warp as wp
 
-LEAST_COSINE = wp.constant(0.02)
-"""The least cosine between a ray and a facet's normal that a footprint is divided by: one that grazes its facet covers
-50 times the width of the ray, and no more."""
-
 
 @wp.struct
 class Footprint:
@@ -24,25 +20,6 @@ class Footprint:
     place_y: wp.vec3
     turn_x: wp.vec3
     turn_y: wp.vec3
-
-
-@wp.func
-def place_on_plane(place: wp.vec3, turn: wp.vec3, direction: wp.vec3, t: float, facet: wp.vec3) -> wp.vec3:
-    """From where a ray meets a plane, after ``t``, to where a neighbour does (equations 10 and 12). ``facet`` is the
-    plane's normal, which faces the ray."""
-    apart = place + t * turn
-    return apart + (wp.dot(apart, facet) / wp.max(-wp.dot(direction, facet), LEAST_COSINE)) * direction
-
-
-@wp.func
-def footprint_on_plane(footprint: Footprint, direction: wp.vec3, t: float, facet: wp.vec3) -> Footprint:
-    """The footprint of a ray where it meets a plane after ``t``."""
-    met = Footprint()
-    met.place_x = place_on_plane(footprint.place_x, footprint.turn_x, direction, t, facet)
-    met.place_y = place_on_plane(footprint.place_y, footprint.turn_y, direction, t, facet)
-    met.turn_x = footprint.turn_x
-    met.turn_y = footprint.turn_y
-    return met
 
 
 @wp.func

@@ -13,6 +13,7 @@ import warp as wp
 from ldtrefl.device import launch
 from ldtrefl.device.bits import lowest_bit
 from ldtrefl.device.native_sources import native_body
+from ldtrefl.geometry.footprint import Footprint
 from ldtrefl.shading.specular import schlick
 from ldtrefl.shading.surface import Surface, albedo_at, part_of
 from ldtrefl.shading.textures import texture_mean
@@ -35,7 +36,12 @@ class Sighting:
     v: float
     view: wp.vec3  # unit; 0 if the eye touches the point
     way: wp.vec3d  # the same of any length, for what is looked at from an eye
-    spread: wp.vec4  # by which barycentrics change to the next pixel: u and v to the right, then below; if followed
+    # Only where footprints are followed (``ray_footprint.py``):
+    t: float  # length of the ray
+    footprint: Footprint  # of the ray where it starts, then where it meets the surface
+    spread: wp.vec4  # by which barycentrics change to the next pixel: u and v to the right, then below
+    normal_turn_x: wp.vec3  # from the point's unit shading normal to that of the next pixel
+    normal_turn_y: wp.vec3
 
 
 CONSTANTS: dict[str, float | int] = {"SMALLEST_NORMAL": SMALLEST_NORMAL}

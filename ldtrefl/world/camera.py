@@ -15,7 +15,6 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
-from ldtrefl.geometry.footprint import Footprint
 from ldtrefl.geometry.vectors import as_single
 from ldtrefl.scene.description import Camera
 
@@ -68,18 +67,15 @@ def pixel_place(camera: CameraView, pixel: int) -> wp.vec2i:
 
 
 @wp.func
-def camera_footprint(camera: CameraView, way: wp.vec3d) -> Footprint:
-    """The footprint at the eye of the ray along ``way``, as :func:`camera_ray` gives it (Igehy 1999, equation 8)."""
-    along = as_single(way)
-    length = wp.length(along)
-    along = along / length
-    reach = 2.0 * camera.spacing / length
-    right = (reach / float(camera.width)) * as_single(camera.right)
-    down = (reach / float(camera.height)) * as_single(camera.down)
-    footprint = Footprint()
-    footprint.turn_x = right - wp.dot(right, along) * along
-    footprint.turn_y = down - wp.dot(down, along) * along
-    return footprint
+def step_right(camera: CameraView) -> wp.vec3:
+    """From a ray of :func:`camera_ray` to the one to its right that its footprint reaches to."""
+    return (2.0 * camera.spacing / float(camera.width)) * as_single(camera.right)
+
+
+@wp.func
+def step_down(camera: CameraView) -> wp.vec3:
+    """From a ray of :func:`camera_ray` to the one below that its footprint reaches to."""
+    return (2.0 * camera.spacing / float(camera.height)) * as_single(camera.down)
 
 
 @functools.lru_cache(maxsize=1)

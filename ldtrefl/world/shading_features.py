@@ -16,8 +16,8 @@ class ShadingFeatures:
     shadows: bool = False
     """Whether lights cast shadows."""
     soft_light: bool = False
-    """Whether there are lights but directional ones and points, or ambient light is dimmed by what stands close: several
-    rays may then be asked from each point, and lights be seen."""
+    """Whether there are lights but directional ones and points, or ambient light is dimmed by what stands close: then
+    several rays may be asked from each point, and lights be seen."""
 
     probes: int = 0
     """The most probes by which a texture is filtered; 0: textures are not filtered, or there are none."""

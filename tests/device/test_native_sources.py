@@ -19,7 +19,7 @@ from ldtrefl.ldt.exact.tree import TreeView
 from ldtrefl.ldt.exact.walk import CONSTANTS, FILES, SEARCH, TREE
 from ldtrefl.ldt.linear import march
 from ldtrefl.scene import shapes
-from ldtrefl.shading import finish, highlights, surfaces, textures
+from ldtrefl.shading import finish, highlights, ray_footprint, surfaces, textures
 from ldtrefl.tracing import bvh_walk
 from ldtrefl.tracing.batch import trace_batch
 from ldtrefl.tracing.hit import Hit
@@ -55,6 +55,7 @@ SOURCES = {
     "shading/pictures.h": (textures.PICTURE_CONSTANTS | {"MOST_PROBES": 16}, ()),
     "shading/highlights.h": (highlights.CONSTANTS, ()),
     "shading/surfaces.h": (surfaces.CONSTANTS, ("device/vectors.h",)),
+    "shading/ray_footprint.h": (ray_footprint.CONSTANTS, ray_footprint.FILES[:-1]),
     "frame/run_rays.h": (run_rays.CONSTANTS, ("device/vectors.h",)),
     "tracing/ray_query.h": ({}, ("device/vectors.h",)),
     "tracing/ray_batch.h": ({}, ("device/vectors.h", "tracing/ray_query.h")),

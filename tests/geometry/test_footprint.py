@@ -5,27 +5,26 @@ import pytest
 import warp as wp
 
 from ldtrefl.device import launch
-from ldtrefl.geometry.footprint import Footprint, footprint_on_plane, is_same_footprint, turn_when_mirrored
+from ldtrefl.geometry.footprint import Footprint, is_same_footprint, turn_when_mirrored
 
 RADIUS = 0.7
 
 
 @launch.kernel
-def meet_and_mirror(
+def mirror(
     first: int,
     # In:
-    footprints: wp.array(dtype=Footprint),
+    footprints: wp.array(dtype=Footprint),  # where rays meet it
     direction: wp.array(dtype=wp.vec3),
-    t: wp.array(dtype=float),
     normal: wp.array(dtype=wp.vec3),
     curvature: float,  # of the mirror: normals turn by it over a length
     # Out:
     met_out: wp.array(dtype=Footprint),
     leaving_out: wp.array(dtype=wp.vec3),
 ):
-    """Let one ray meet a mirror."""
+    """Let one ray leave a mirror."""
     i = first + wp.tid()
-    met = footprint_on_plane(footprints[i], direction[i], t[i], normal[i])
+    met = footprints[i]
     leaving = wp.normalize(direction[i] - 2.0 * wp.dot(direction[i], normal[i]) * normal[i])
     x = turn_when_mirrored(met.turn_x, direction[i], normal[i], curvature * met.place_x, leaving)
     y = turn_when_mirrored(met.turn_y, direction[i], normal[i], curvature * met.place_y, leaving)
@@ -45,13 +44,15 @@ def mirrored_by_kernel(
     """((n, 2, 3) places, turns) after the mirror, of (n, 2, 3) before it."""
     device, count = launch.resolve_device(None), len(t)
     given = np.zeros(count, Footprint.numpy_dtype())
+    apart = place + t[:, None, None] * turn
+    cosine = (direction * normal).sum(axis=-1)[:, None, None]
+    on_plane = apart - (apart * normal[:, None]).sum(axis=-1, keepdims=True) / cosine * direction[:, None]
     for axis, name in enumerate("xy"):
-        given[f"place_{name}"], given[f"turn_{name}"] = place[:, axis], turn[:, axis]
+        given[f"place_{name}"], given[f"turn_{name}"] = on_plane[:, axis], turn[:, axis]
     met, leaving = wp.empty(count, dtype=Footprint, device=device), wp.empty(count, dtype=wp.vec3, device=device)
     vectors = [wp.array(values, dtype=wp.vec3, device=device) for values in (direction, normal)]
-    distances = wp.array(t, dtype=float, device=device)
-    inputs = [wp.array(given, dtype=Footprint, device=device), vectors[0], distances, vectors[1], curvature]
-    launch.launch(meet_and_mirror, count, [*inputs, met, leaving], device)
+    inputs = [wp.array(given, dtype=Footprint, device=device), *vectors, curvature]
+    launch.launch(mirror, count, [*inputs, met, leaving], device)
     made = met.numpy()
     return tuple(np.stack([made[f"{kind}_{name}"] for name in "xy"], axis=1) for kind in ("place", "turn"))  # type: ignore[return-value]
 

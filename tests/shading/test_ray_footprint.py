@@ -7,7 +7,7 @@ import warp as wp
 from ldtrefl.device import launch
 from ldtrefl.frame.gbuffer import GBufferView, sight
 from ldtrefl.scene.description import Camera, Material, Object, Scene
-from ldtrefl.shading.ray_footprint import barycentrics_of
+from ldtrefl.shading.ray_footprint import meet_along
 from ldtrefl.shading.surface import Surface
 from ldtrefl.shading.surfaces import Sighting, look_from
 from ldtrefl.world.records import ObjectRecord
@@ -61,13 +61,14 @@ def find_spread(
     # Out:
     sightings_out: wp.array(dtype=Sighting),
     surfaces_out: wp.array(dtype=Surface),
-    spread_out: wp.array(dtype=wp.vec4),
 ):
     """Find by how much barycentrics change to two places about what a pixel sees."""
     sight(gbuffer, pixel, sightings_out, 0)
     look_from(objects, 1, gbuffer.camera.eye, sightings_out, surfaces_out)
-    triangle = sightings_out[0].triangle
-    spread_out[0] = barycentrics_of(objects[sightings_out[0].object], triangle, place_x, place_y)
+    sightings_out[0].t = 0.0
+    sightings_out[0].footprint.place_x = place_x
+    sightings_out[0].footprint.place_y = place_y
+    meet_along(objects, 1, sightings_out, surfaces_out)
 
 
 def test_barycentrics_change_as_the_way_along_the_edges() -> None:
@@ -80,7 +81,6 @@ def test_barycentrics_change_as_the_way_along_the_edges() -> None:
     ways = np.array([[0.3, -0.2], [0.05, 0.7]]) @ (corners[1:] - corners[0])
     device = scene.device
     sightings, surfaces = wp.zeros(8, dtype=Sighting, device=device), wp.zeros(8, dtype=Surface, device=device)
-    spread = wp.empty(1, dtype=wp.vec4, device=device)
-    inputs = [gbuffer.view, scene.records, pixel, wp.vec3(*ways[0]), wp.vec3(*ways[1]), sightings, surfaces, spread]
+    inputs = [gbuffer.view, scene.records, pixel, wp.vec3(*ways[0]), wp.vec3(*ways[1]), sightings, surfaces]
     launch.launch(find_spread, 1, inputs, device)
-    np.testing.assert_allclose(spread.numpy()[0], [0.3, -0.2, 0.05, 0.7], rtol=1e-5)
+    np.testing.assert_allclose(sightings.numpy()["spread"][0], [0.3, -0.2, 0.05, 0.7], rtol=1e-5)

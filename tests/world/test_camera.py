@@ -6,18 +6,16 @@ import numpy as np
 import pytest
 import warp as wp
 
-from ldtrefl.device import launch
-from ldtrefl.geometry.footprint import Footprint
 from ldtrefl.scene.description import Camera
 from ldtrefl.world.camera import (
     Band,
-    CameraView,
     camera_axes,
-    camera_footprint,
     camera_ray,
     camera_view,
     pixels_from_world,
     ray_spacing,
+    step_down,
+    step_right,
     unit_up,
     whole_image,
 )
@@ -78,28 +76,14 @@ def test_the_eye_is_moved_to_device_space() -> None:
     assert isinstance(view.eye, wp.vec3d)
 
 
-@launch.kernel
-def find_footprints(first: int, view: CameraView, ways: wp.array(dtype=wp.vec3d), out: wp.array(dtype=Footprint)):
-    """Find the footprint of one ray."""
-    out[first + wp.tid()] = camera_footprint(view, ways[first + wp.tid()])
-
-
 @pytest.mark.parametrize("samples", [1, 4])
-def test_a_footprint_reaches_to_the_next_ray(samples: int) -> None:
-    view, device = camera_view(CAMERA, WORLD, whole_image(CAMERA), samples), launch.resolve_device(None)
-    points, reach = [(30.5, 20.5), (0.5, 39.5), (59.5, 3.5)], {1: 1.0, 4: 0.3}[samples]
-
-    def directions(x: float, y: float) -> np.ndarray:
-        ways = np.array([camera_ray(view, wp.float64(a + x), wp.float64(b + y)) for a, b in points])
-        return ways / np.linalg.norm(ways, axis=1, keepdims=True)
-
-    ways = wp.array([camera_ray(view, *map(wp.float64, point)) for point in points], dtype=wp.vec3d, device=device)
-    found = wp.empty(3, dtype=Footprint, device=device)
-    launch.launch(find_footprints, 3, [view, ways, found], device)
-    for name, step in (("turn_x", (0.5, 0.0)), ("turn_y", (0.0, 0.5))):
-        expected = reach * (directions(*step) - directions(-step[0], -step[1]))
-        np.testing.assert_allclose(found.numpy()[name], expected, atol=1e-5)
-    assert not found.numpy()["place_x"].any() and not found.numpy()["place_y"].any()
+def test_steps_reach_to_the_next_rays(samples: int) -> None:
+    view, reach = camera_view(CAMERA, WORLD, whole_image(CAMERA), samples), {1: 1.0, 4: 0.3}[samples]
+    ray, right, below = (
+        np.array(camera_ray(view, wp.float64(x), wp.float64(y))) for x, y in ((5.5, 8.5), (6.5, 8.5), (5.5, 9.5))
+    )
+    np.testing.assert_allclose(step_right(view), reach * (right - ray), atol=1e-6)
+    np.testing.assert_allclose(step_down(view), reach * (below - ray), atol=1e-6)
 
 
 def test_rays_of_a_pixel_reach_less_far_the_more_they_are() -> None:
