@@ -1,8 +1,8 @@
 """Measures how textures are filtered (``ldtrefl/shading/textures.py``): a checkered floor in a mirror ball, from above
 and grazing, turning by half a degree a frame, against frames of 256 samples a pixel that filter nothing.
 
-Images are blended from one sample a pixel, or from several on a grid within it, by a Gaussian of 0.375 pixels. What is
-printed is of what the ball shows:
+Images are blended from one sample a pixel, or from several on a grid within it, by a Gaussian of 0.375 pixels; or by
+the renderer itself, from samples where pixels differ. What is printed is of what the ball shows:
 
 - *fine*: the share of the picture's energy in what is finer than four pixels (half of the Nyquist frequency), and
   *finest* in what is finer than two and two thirds; both over the reference's. Above 1 is aliasing, below 1 blur.
@@ -70,11 +70,15 @@ class Way:
     """Along each axis of a pixel."""
     filters: bool = False
     anisotropy: int = 16
+    adaptive: int = 1
+    """The most samples of a pixel that the renderer itself takes where pixels differ, and blends."""
 
     def renderer(self, scene: Scene, skip: str = "all") -> ldtrefl.Renderer:
         """A renderer that renders so."""
         filters, probes = self.filters, self.anisotropy
-        return ldtrefl.Renderer(scene, "ldt", skip=skip, samples=1, filter_textures=filters, anisotropy=probes)
+        return ldtrefl.Renderer(
+            scene, "ldt", skip=skip, samples=self.adaptive, filter_textures=filters, anisotropy=probes
+        )
 
 
 WAYS = {
@@ -83,6 +87,8 @@ WAYS = {
     "1 sample, trilinear": Way(1, filters=True, anisotropy=1),
     "4 samples": Way(2),
     "4 samples, filtered": Way(2, filters=True),
+    "4, adaptive": Way(1, filters=True, adaptive=4),
+    "16, adaptive": Way(1, filters=True, adaptive=16),
 }
 
 
@@ -160,7 +166,7 @@ def flicker(frames: list[np.ndarray], inside: np.ndarray) -> float:
 
 
 def milliseconds(scene: Scene, rounds: int) -> dict[str, float]:
-    """Of a frame in each way with one sample a pixel."""
+    """Of a frame in each way in which frames are as large as the picture."""
     renderers = {
         name: way.renderer(scene, "reflection,regions,maps,bounds,attributes")
         for name, way in WAYS.items()

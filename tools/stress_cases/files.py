@@ -269,7 +269,7 @@ def scene_text(thing: str, sky: str = "8.png", texture: str = "8.png") -> str:
 def render(scene: Path, output: Path, *options: str) -> int:
     """The command line in this process, with its report thrown away."""
     with contextlib.redirect_stdout(io.StringIO()):
-        return program.main(["render", str(scene), "-o", str(output), "--threads", "1", *options])
+        return program.main(["render", str(scene), "-o", str(output), "--threads", "1", "--samples", "1", *options])
 
 
 def read(path: Path) -> np.ndarray | None:
