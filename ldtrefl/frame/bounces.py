@@ -194,6 +194,41 @@ def summed_by_pixel(pixels: wp.array, rays: RayBuffer, radiance: wp.array) -> wp
     return total
 
 
+def shade_ends(
+    gbuffer: GBuffer,
+    rays: RayBuffer,
+    hits: HitBuffer,
+    shadow: BoundTracer,
+    radiance: wp.array,
+    *,
+    numbers: np.ndarray | None = None,
+    least_weight: float,
+) -> RayBuffer:
+    """Add what rays have met to what they bring, and send them on from mirrors.
+
+    Args:
+        gbuffer: what the camera sees.
+        rays: (n,) as they set out.
+        hits: where they end.
+        shadow: the tracer that answers shadow rays.
+        radiance: (m,) vec3 that each of the first bounce's rays brings.
+        numbers: (n,) int32 of the rays among those; all of them if not given.
+        least_weight: rays of which less would arrive end at a mirror, which reflects the environment alone.
+
+    Returns:
+        (n,) rays that go on, where a source is not -1.
+    """
+    scene, device, count = gbuffer.scene, gbuffer.scene.device, rays.pixel.shape[0]
+    onwards = empty_rays(count, device, carries_footprints=scene.features.footprints)
+    places = wp.array(np.empty(0, np.int32) if numbers is None else numbers, dtype=wp.int32, device=device)
+    block = block_of(device)
+    inputs = [block, rays, hits, scene.records, scene.top_level, scene.lighting, scene.looks, shadow.views]
+    inputs += [gbuffer.view, places, least_weight, radiance, onwards]
+    kernel = shade_hits_kernel(shadow.tracer, scene.features)
+    launch.launch(kernel, -(-count // block), inputs, device)
+    return onwards
+
+
 class Guide(Protocol):
     """A method's part in a bounce: which objects rays can meet, and the tracer that answers them."""
 
@@ -318,14 +353,8 @@ class RayFollower:
             self._count(rays, hits)
         with self.stats.stage("shade", device):
             shadow = tracer if scene.scene.lighting.is_traced else no_shadows(device)
-            onwards = empty_rays(count, device, carries_footprints=scene.features.footprints)
-            places = wp.array(np.empty(0, np.int32) if numbers is None else numbers, dtype=wp.int32, device=device)
             weight = np.inf if is_last else self.limits.least_weight
-            block = block_of(device)
-            inputs = [block, rays, hits, scene.records, scene.top_level, scene.lighting, scene.looks, shadow.views]
-            inputs += [self.gbuffer.view, places, weight, radiance, onwards]
-            kernel = shade_hits_kernel(shadow.tracer, scene.features)
-            launch.launch(kernel, -(-count // block), inputs, device)
+            onwards = shade_ends(self.gbuffer, rays, hits, shadow, radiance, numbers=numbers, least_weight=weight)
         return hits, onwards
 
     def _needed(self, regions: Regions) -> set[int]:

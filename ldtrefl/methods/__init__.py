@@ -1,6 +1,7 @@
 """The reflection methods, one per file, found by scanning this folder: delete a file and its method is gone.
 
 Imports ``frame``, ``ldt`` and what is below them; no method imports another. Start with ``base.py``, the contract.
+Folders hold what several methods share: ``virtual/``, for those that move vertices to where a mirror shows them.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ def all_methods() -> dict[str, type[Method]]:
     """Every method by name."""
     found = {}
     for module in pkgutil.iter_modules([str(Path(__file__).parent)]):
-        if module.name != "base":
+        if module.name != "base" and not module.ispkg:
             loaded = importlib.import_module(f"{__name__}.{module.name}")
             for value in vars(loaded).values():
                 if isinstance(value, type) and issubclass(value, Method) and value.__module__ == loaded.__name__:
