@@ -78,7 +78,7 @@ def test_planes_have_unit_normals_whatever_the_triangles_size() -> None:
 
 def test_curved_mirrors_are_refused_by_name() -> None:
     mirror = Object(name="ball", shape="sphere", material=MIRROR)
-    with pytest.raises(ldtrefl.InputError, match="^object 'ball': method planar .*more than 16 planes.*ldt or bvh"):
+    with pytest.raises(ldtrefl.InputError, match=r"^object 'ball': method planar .*more than 16 planes.*ldt or bvh"):
         ldtrefl.render(screen(objects=(mirror,)), "planar")
 
 
