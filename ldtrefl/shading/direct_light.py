@@ -47,6 +47,11 @@ def make_direct_radiance(share_lit: Callable[..., float], features: ShadingFeatu
         finishes: wp.array(dtype=Finish),
         pixel: wp.vec2i,
     ) -> wp.vec3:
+        scatters = wp.max(surface.albedo) > 0.0
+        if with_looks:
+            scatters = scatters or objects[surface.object].look >= 0
+        if not scatters:  # a mirror, or what only glows: no light is looked for
+            return at_most_largest(surface.emission)
         total = lighting.ambient
         shine = wp.vec3(0.0)
         normal = surface.normal
