@@ -25,6 +25,31 @@ from ldtrefl.world.shading_features import ShadingFeatures
 from ldtrefl.world.top_level import TopLevel
 
 
+@wp.struct
+class ArrivingLight:
+    """What a light sends to a point."""
+
+    towards: wp.vec3  # unit, the way to it
+    distance: float  # +inf for a directional light
+    radiance: wp.vec3  # as if it were a directional light's
+
+
+@wp.func
+def light_at(lighting: LightingRecord, i: int, position: wp.vec3d) -> ArrivingLight:
+    """What light ``i`` sends to a point if nothing is between."""
+    light = ArrivingLight()
+    light.towards = lighting.lights[i].towards
+    light.radiance = lighting.lights[i].radiance
+    light.distance = wp.inf
+    if lighting.lights[i].is_point != 0:
+        offset = from_to(position, lighting.lights[i].position)
+        distance = wp.length(offset)
+        light.distance = distance
+        light.towards = wp.normalize(offset)
+        light.radiance = at_most_largest(light.radiance / wp.max(distance * distance, SMALLEST_SQUARE))
+    return light
+
+
 def make_direct_radiance(share_lit: Callable[..., float], features: ShadingFeatures) -> Callable[..., wp.vec3]:
     """``direct_radiance(views, objects, top, lighting, looks, surface, finishes, pixel)``: emitted and scattered
     radiance; the first of ``finishes`` counts only if there are looks.
@@ -63,29 +88,23 @@ def make_direct_radiance(share_lit: Callable[..., float], features: ShadingFeatu
             total = lit.ambient * total + lit.scattered
             shine = lit.mirrored
         for i in range(lighting.lights.shape[0]):
-            towards = lighting.lights[i].towards
-            radiance = lighting.lights[i].radiance
-            distance = float(wp.inf)
-            if lighting.lights[i].is_point != 0:
-                offset = from_to(surface.position, lighting.lights[i].position)
-                distance = wp.length(offset)
-                towards = wp.normalize(offset)
-                radiance = at_most_largest(radiance / wp.max(distance * distance, SMALLEST_SQUARE))
-            cosine = wp.dot(normal, towards)
+            light = light_at(lighting, i, surface.position)
+            cosine = wp.dot(normal, light.towards)
             if cosine > 0.0:
                 share = float(1.0)
                 if with_shadows:
-                    share = share_lit(views, objects, top, looks, surface, towards, distance)
+                    share = share_lit(views, objects, top, looks, surface, light.towards, light.distance)
                 if share > 0.0:
+                    radiance = light.radiance
                     if with_looks:
-                        radiance = share * radiance
+                        radiance = share * light.radiance
                         if lighting.lights[i].is_in_picture == 0:
-                            shine += wp.cw_mul(highlights(finishes, towards), radiance)
+                            shine += wp.cw_mul(highlights(finishes, light.towards), radiance)
                     total += cosine * radiance
-        light = surface.emission + wp.cw_mul(surface.albedo, total)
+        leaving = surface.emission + wp.cw_mul(surface.albedo, total)
         if with_looks:
-            light += shine
-        return at_most_largest(light)
+            leaving += shine
+        return at_most_largest(leaving)
 
     return direct_radiance
 
