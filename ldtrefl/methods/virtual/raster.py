@@ -22,7 +22,7 @@ from ldtrefl.geometry.perspective_raster import (
     perspective_weights,
 )
 from ldtrefl.geometry.vectors import as_single, from_to
-from ldtrefl.methods.virtual.vertex import VirtualVertex, device_vertex
+from ldtrefl.methods.virtual.vertex import HIDDEN, VirtualVertex, device_vertex
 from ldtrefl.tracing.ray_buffers import HitBuffer, RayBuffer
 from ldtrefl.world.camera import CameraView
 from ldtrefl.world.records import ObjectRecord
@@ -143,6 +143,12 @@ def draw_back_faces(
                                 keep_nearer_at(keys, k, nearness, 0)
 
 
+@wp.func
+def is_drawn(a: int, b: int, c: int) -> bool:
+    """Whether the triangle between vertices that are seen so is drawn."""
+    return wp.min(a, wp.min(b, c)) > 0 and wp.min(a, wp.min(b, c)) < HIDDEN
+
+
 @launch.kernel
 def draw_virtual(
     first: int,
@@ -166,7 +172,7 @@ def draw_virtual(
     for i in range(begin, wp.min(begin + CHUNK, objects[k].faces.shape[0])):
         face = objects[k].faces[i]
         a, b, c = base + face[0], base + face[1], base + face[2]
-        if vertices[a].is_seen + vertices[b].is_seen + vertices[c].is_seen == 3:
+        if is_drawn(vertices[a].is_seen, vertices[b].is_seen, vertices[c].is_seen):
             pa, pb = in_pixels(camera, vertices[a].position), in_pixels(camera, vertices[b].position)
             pc = in_pixels(camera, vertices[c].position)
             box = touched_pixels(points, pa, pb, pc)

@@ -13,6 +13,10 @@ from ldtrefl.device.bins import CHUNK
 from ldtrefl.world.records import ObjectRecord
 from ldtrefl.world.unit_rays import unit_vertex
 
+HIDDEN = wp.constant(2)
+"""Of a vertex behind the reflector, which is placed so that triangles between it and others are right where they are
+seen: triangles between hidden ones alone are left out."""
+
 
 @wp.struct
 class VirtualVertex:
@@ -22,7 +26,7 @@ class VirtualVertex:
     distance: float  # from the reflection point to the vertex, or what is as good: the depth test compares it
     depth: float  # of the reflection point along the camera's axis: it must lie before the reflector's back faces
     above: float  # fragments are left out where this, interpolated, is below 0
-    is_seen: int  # 0 if it is not reflected, or not known where: its triangles are left out
+    is_seen: int  # 1; HIDDEN; or 0 if it is not known where it is: its triangles are left out
 
 
 @wp.struct
