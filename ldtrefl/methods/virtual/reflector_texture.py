@@ -16,7 +16,7 @@ from ldtrefl.frame.drawn_objects import DrawnObjects
 from ldtrefl.frame.visibility import resolved
 from ldtrefl.frame.zbuffer import CornerRoom, Drawing
 from ldtrefl.scene.description import Camera
-from ldtrefl.world.camera import whole_image
+from ldtrefl.world.camera import CameraView, whole_image
 from ldtrefl.world.device_scene import DeviceScene
 
 WIDEST = 150.0
@@ -32,6 +32,7 @@ class ReflectorTexture:
     object: wp.array(dtype=wp.int32)  # -1 where it is not seen
     width: int
     height: int
+    camera: CameraView  # that sees it
     start: int  # a texel that sees it, in the middle of the box about all of these; -1 if there is none
 
 
@@ -54,6 +55,7 @@ def texture_of(scene: DeviceScene, number: int, camera: Camera) -> ReflectorText
     texture.position, texture.normal = gbuffer.surfaces
     texture.object = gbuffer.view.object
     texture.width, texture.height = camera.width, camera.height
+    texture.camera = gbuffer.view.camera
     texture.start = _middle(gbuffer.objects >= 0)
     return texture
 
