@@ -14,10 +14,13 @@ vertex about the normal; mirrored it must be, or virtual vertices would jump at 
 
     ldtrefl render scene.toml --method bisector --set widening=1.5
 
-Fails: reflection points lie at texels, so reflections are off by as much, and shake; triangles have straight edges in
-the mirror, so coarse objects are not bent; where a vertex has several reflections, on concave reflectors and those of
-mixed curvature, the nearest best texel is taken; what would be reflected twice is not; beyond the wider view vertices
-are put at its border.
+With ``levels`` above 0 triangles are first taken to pieces where the mirror bends them, as ``tessellation`` does it.
+
+Fails: reflection points lie at texels, so reflections are off by as much, and shake (``fineness``); triangles have
+straight edges in the mirror, so coarse objects are not bent unless they are taken to pieces; where a vertex has several
+reflections, on concave reflectors and those of mixed curvature, the best texel that the search comes to is taken; what
+would be reflected twice is not; beyond the wider view vertices are put at its border; open reflectors show what is
+beside them at their border (region B), unless they are closed.
 """
 
 from __future__ import annotations
@@ -32,10 +35,9 @@ from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.history import Reusable
 from ldtrefl.frame.reflected_light import ReflectedLight
 from ldtrefl.methods.base import CONFIG, CommonConfig, RayMethod
-from ldtrefl.methods.virtual.bisector_places import BisectorPlaces
+from ldtrefl.methods.virtual.bisector_places import TextureView, draw_bisected
 from ldtrefl.methods.virtual.image import VirtualImage
-from ldtrefl.methods.virtual.reflector_texture import texture_of, wider
-from ldtrefl.methods.virtual.subdivision import Subdivider, Subdivision
+from ldtrefl.methods.virtual.subdivision import Subdivision
 from ldtrefl.tracing.nothing import shadow_tracer
 from ldtrefl.tracing.ray_buffers import RayBuffer
 
@@ -57,7 +59,7 @@ class Bisector(RayMethod):
         levels: Annotated[int, Field(strict=True, ge=0, le=8)] = 0
         """Rounds in which triangles are divided where the mirror bends them, 0 to 8."""
         threshold: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0005
-        """The largest error of an edge that is not divided, 0 to 1."""
+        """The error of an edge, 0 to 1, from which it is divided."""
         crack_free: Annotated[bool, Field(strict=True)] = True
         """Whether edges are divided by their own errors, so that no holes open between triangles."""
 
@@ -67,19 +69,10 @@ class Bisector(RayMethod):
         self, gbuffer: GBuffer, rays: RayBuffer, reusable: Reusable | None, stats: Stats
     ) -> ReflectedLight:
         """Search for the vertices of all objects in each reflector that is seen, and draw them there."""
-        scene, device, config = self.scene, self.scene.device, self.config
-        image = VirtualImage(gbuffer, rays)
+        config, device, image = self.config, self.scene.device, VirtualImage(gbuffer, rays)
         stats.count("rays", rays.pixel.shape[0])
-        view = wider(gbuffer.camera, config.widening, config.fineness)
-        rule = Subdivision(config.threshold, config.levels, config.crack_free)
         with stats.stage("virtual", device):
-            for reflector in image.reflectors:
-                texture = texture_of(scene, reflector, view)
-                if texture.start >= 0:
-                    places = BisectorPlaces(gbuffer.view.camera, texture, stats)
-                    if rule.levels:
-                        image.draw_pieces(reflector, Subdivider(scene, rule, places, places.errors, stats))
-                    else:
-                        image.draw(reflector, places)
+            rule = Subdivision(config.threshold, config.levels, config.crack_free)
+            draw_bisected(image, gbuffer, TextureView(config.widening, config.fineness), rule, stats)
         with stats.stage("shade", device):
-            return image.reflected(shadow_tracer(self.tracer, scene, stats))
+            return image.reflected(shadow_tracer(self.tracer, self.scene, stats))

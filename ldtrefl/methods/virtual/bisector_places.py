@@ -12,10 +12,12 @@ import warp as wp
 
 from ldtrefl.device import launch
 from ldtrefl.device.stats import Stats
+from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.geometry.vectors import as_double
+from ldtrefl.methods.virtual.image import VirtualImage
 from ldtrefl.methods.virtual.raster import in_pixels
-from ldtrefl.methods.virtual.reflector_texture import ReflectorTexture
-from ldtrefl.methods.virtual.subdivision import SurfacePoint, edge_errors_kernel
+from ldtrefl.methods.virtual.reflector_texture import ReflectorTexture, texture_of, wider
+from ldtrefl.methods.virtual.subdivision import Subdivider, Subdivision, SurfacePoint, edge_errors_kernel
 from ldtrefl.methods.virtual.texel_search import search_texel
 from ldtrefl.methods.virtual.vertex import HIDDEN, VirtualVertex, unfolded
 from ldtrefl.world.camera import CameraView
@@ -63,6 +65,16 @@ def texel_towards(texture: ReflectorTexture, camera: CameraView, point: wp.vec3d
     return found
 
 
+@dataclass(frozen=True)
+class TextureView:
+    """The view in which reflectors are searched."""
+
+    widening: float
+    """How many times as wide as the image."""
+    fineness: float
+    """Texels along a pixel."""
+
+
 @dataclass(frozen=True, eq=False)
 class BisectorPlaces:
     """Places vertices where one reflector shows them."""
@@ -87,3 +99,21 @@ class BisectorPlaces:
         inputs = [self.camera, self.texture, pieces, points, vertices, errors]
         launch.launch(kernel, pieces.shape[0], inputs, pieces.device)
         return errors
+
+
+def draw_bisected(image: VirtualImage, gbuffer: GBuffer, search: TextureView, rule: Subdivision, stats: Stats) -> None:
+    """Search for the vertices of all objects in each reflector that is seen, and draw them there; their triangles are
+    first taken to pieces if ``rule`` has levels.
+
+    Raises:
+        InputError: vertices or pieces need more memory than is allowed.
+    """
+    scene, view = gbuffer.scene, wider(gbuffer.camera, search.widening, search.fineness)
+    for reflector in image.reflectors:
+        texture = texture_of(scene, reflector, view)
+        if texture.start >= 0:
+            places = BisectorPlaces(gbuffer.view.camera, texture, stats)
+            if rule.levels:
+                image.draw_pieces(reflector, Subdivider(scene, rule, places, places.errors, stats))
+            else:
+                image.draw(reflector, places)

@@ -50,7 +50,7 @@ class Subdivision:
     """How triangles are taken to pieces."""
 
     threshold: float
-    """The largest error of an edge, 0 to 1."""
+    """Edges whose error is less are good enough: 0 divides all, 1 none."""
     levels: int
     """Rounds, at most."""
     crack_free: bool
@@ -255,7 +255,7 @@ class Subdivider:
 
     def _divided_edges(self, errors: np.ndarray) -> np.ndarray:
         """(n,) bits of the edges that are divided, of (n, 3) errors."""
-        is_above = errors > self.rule.threshold
+        is_above = (errors >= self.rule.threshold) & (self.rule.threshold < 1.0)
         if not self.rule.crack_free:
             is_above = np.repeat(is_above.any(axis=1, keepdims=True), 3, axis=1)
         return np.asarray(is_above @ np.array([1, 2, 4]))
