@@ -27,14 +27,13 @@ from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.history import Reusable
 from ldtrefl.frame.reflected_light import ReflectedLight
 from ldtrefl.methods.base import CommonConfig, RayMethod
-from ldtrefl.methods.virtual.image import DrawnVertices, VirtualImage
-from ldtrefl.methods.virtual.vertex import VirtualVertex, device_vertex, vertex_chunk
+from ldtrefl.methods.virtual.image import VirtualImage
+from ldtrefl.methods.virtual.vertex import VirtualVertex
 from ldtrefl.tracing.nothing import shadow_tracer
 from ldtrefl.tracing.ray_buffers import RayBuffer
 from ldtrefl.tracing.tracer import SceneTracer
 from ldtrefl.world.camera import CameraView
 from ldtrefl.world.device_scene import DeviceScene
-from ldtrefl.world.records import ObjectRecord
 
 MOST_PLANES = 16
 """Planes of a mirror."""
@@ -65,25 +64,20 @@ def mirror_vertices(
     camera: CameraView,
     normal: wp.vec3d,
     offset: wp.float64,
-    chunks: wp.array(dtype=wp.vec2i),
-    numbers: wp.array(dtype=wp.int32),
-    first_vertex: wp.array(dtype=wp.int32),
-    objects: wp.array(dtype=ObjectRecord),
+    points: wp.array(dtype=wp.vec3d),
     # Out:
     vertices_out: wp.array(dtype=VirtualVertex),
 ):
-    """Mirror the vertices of one chunk at a plane, on whose side the normal points to the eye."""
-    chunk = vertex_chunk(chunks, numbers, first_vertex, objects, first + wp.tid())
-    for i in range(chunk.begin, chunk.end):
-        point = device_vertex(objects[chunk.object], i)
-        height = wp.dot(normal, point) + offset
-        made = VirtualVertex()
-        made.position = point - wp.float64(2.0) * height * normal
-        # Along a ray from the eye depth grows as the distance does, and is linear on the triangle.
-        made.distance = float(wp.dot(made.position - camera.eye, camera.forward))
-        made.above = float(height)
-        made.is_seen = 1
-        vertices_out[chunk.first + i] = made
+    """Mirror one point at a plane, on whose side the normal points to the eye."""
+    i = first + wp.tid()
+    height = wp.dot(normal, points[i]) + offset
+    made = VirtualVertex()
+    made.position = points[i] - wp.float64(2.0) * height * normal
+    # Along a ray from the eye depth grows as the distance does, and is linear on the triangle.
+    made.distance = float(wp.dot(made.position - camera.eye, camera.forward))
+    made.above = float(height)
+    made.is_seen = 1
+    vertices_out[i] = made
 
 
 class Planar(RayMethod):
@@ -125,13 +119,14 @@ class Planar(RayMethod):
         with stats.stage("shade", device):
             return image.reflected(shadow_tracer(self.tracer, scene, stats))
 
-    def _mirror(self, gbuffer: GBuffer, normal: np.ndarray, offset: float, placed: DrawnVertices) -> None:
-        """Mirror the vertices of all objects that are drawn at a plane."""
+    def _mirror(
+        self, gbuffer: GBuffer, normal: np.ndarray, offset: float, points: wp.array, vertices: wp.array
+    ) -> None:
+        """Mirror points at a plane."""
         camera = gbuffer.view.camera
         side = 1.0 if float(normal @ np.array(camera.eye)) + offset >= 0.0 else -1.0
-        inputs = [camera, wp.vec3d(*(side * normal)), wp.float64(side * offset), placed.chunks, placed.numbers]
-        inputs += [placed.first_vertex, self.scene.records, placed.vertices]
-        launch.launch(mirror_vertices, placed.chunks.shape[0], inputs, self.scene.device)
+        inputs = [camera, wp.vec3d(*(side * normal)), wp.float64(side * offset), points, vertices]
+        launch.launch(mirror_vertices, points.shape[0], inputs, self.scene.device)
 
 
 def planes_of(scene: DeviceScene, number: int) -> Planes:

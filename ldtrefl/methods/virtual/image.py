@@ -26,34 +26,26 @@ from ldtrefl.frame.projection import chunks_of
 from ldtrefl.frame.reflected_light import ReflectedLight
 from ldtrefl.frame.sample_points import SamplePoints
 from ldtrefl.frame.taken_rays import taken
-from ldtrefl.methods.virtual.raster import DrawnPoints, draw_back_faces, draw_virtual, resolve_points
-from ldtrefl.methods.virtual.vertex import VirtualVertex
+from ldtrefl.methods.virtual.raster import (
+    DrawnPoints,
+    draw_back_faces,
+    draw_pieces,
+    draw_virtual,
+    resolve_pieces,
+    resolve_points,
+)
+from ldtrefl.methods.virtual.vertex import VirtualVertex, find_points
 from ldtrefl.tracing.ray_buffers import RayBuffer, RayEnds, empty_hits
 from ldtrefl.tracing.tracer import BoundTracer
 from ldtrefl.world.camera import CameraView
+from ldtrefl.world.device_scene import DeviceScene
 
-VERTEX_BYTES = 48
-"""Bytes of a virtual vertex and of its place."""
-
-
-@dataclass(frozen=True, eq=False)
-class DrawnVertices:
-    """The vertices that a method places, and where."""
-
-    drawn: np.ndarray
-    """(n,) int32 numbers of the objects."""
-    chunks: wp.array
-    """vec2i: the vertices of these objects in chunks (``chunks_of``)."""
-    numbers: wp.array
-    """(n,) int32: ``drawn`` on the device."""
-    first_vertex: wp.array
-    """(n,) int32: the place of each object's vertex 0."""
-    vertices: wp.array
-    """VirtualVertex of all of them, to be filled in."""
+VERTEX_BYTES = 96
+"""Bytes of a virtual vertex and of the point that it stands for."""
 
 
-PlaceVertices = Callable[[DrawnVertices], None]
-"""Fills in virtual vertices."""
+PlaceVertices = Callable[[wp.array, wp.array], None]
+"""``place(points, vertices_out)``: fills in the virtual vertices of (n,) vec3d points in device space."""
 
 
 @launch.kernel
@@ -70,6 +62,52 @@ def find_depths(
     i = first + wp.tid()
     away = rays.origin[ray_of[i]] - camera.eye
     depth_out[i] = float(wp.dot(away, camera.forward))
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnMeshes:
+    """The objects that a mirror may show, and the place of their vertices in arrays of all of them."""
+
+    numbers: np.ndarray
+    """(n,) int32."""
+    first_vertex: np.ndarray
+    """(n,) int32: the place of each one's vertex 0."""
+    vertex_count: int
+
+    @classmethod
+    def of(cls, scene: DeviceScene, numbers: np.ndarray) -> DrawnMeshes:
+        """The objects of these numbers."""
+        counts = scene.vertex_counts[numbers]
+        return cls(numbers, (np.cumsum(counts) - counts).astype(np.int32), int(counts.sum()))
+
+    def points(self, scene: DeviceScene) -> wp.array:
+        """(vertices,) vec3d in device space.
+
+        Raises:
+            InputError: they need more memory than is allowed.
+        """
+        device = scene.device
+        budget.take(VERTEX_BYTES * self.vertex_count, "the virtual vertices of the scene", "the number of vertices")
+        chunks = chunks_of(scene.vertex_counts[self.numbers], device)
+        points = wp.empty(self.vertex_count, dtype=wp.vec3d, device=device)
+        arrays = [wp.array(values, dtype=wp.int32, device=device) for values in (self.numbers, self.first_vertex)]
+        launch.launch(find_points, chunks.shape[0], [chunks, *arrays, scene.records, points], device)
+        return points
+
+
+Subdivide = Callable[[DrawnMeshes], tuple[wp.array, wp.array]]
+"""From meshes to (n,) ``Piece`` of their triangles and (m,) ``VirtualVertex`` that are the pieces' corners."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """A mirror, or a part of one, as it is drawn to."""
+
+    points: DrawnPoints
+    ray_of: wp.array
+    """(n,) int32: the ray that leaves it at each point."""
+    backs: wp.array
+    """(n,) int64 of ``draw_back_faces``."""
 
 
 class VirtualImage:
@@ -106,58 +144,80 @@ class VirtualImage:
         """The numbers of the objects that are seen as mirrors."""
         yield from (number for number in np.unique(self._given.source.numpy()).tolist() if number >= 0)
 
-    def draw(self, reflector: int, place_vertices: PlaceVertices, chosen: np.ndarray | None = None) -> None:
+    def draw(self, reflector: int, place: PlaceVertices, chosen: np.ndarray | None = None) -> None:
         """Draw what a mirror shows of all other objects.
 
         Args:
             reflector: the mirror.
-            place_vertices: places the vertices of the others where it shows them.
+            place: places the vertices of the others where it shows them.
             chosen: (n,) bool, the rays of the part of the mirror that shows them so; all of its rays if not given. A
                 ray is drawn to once: what is drawn later replaces it.
 
         Raises:
             InputError: the vertices need more memory than is allowed, or the scene has too many triangles.
         """
+        part, others = self._part(reflector, chosen), self._others(reflector)
+        if part is None or not len(others.numbers):
+            return
         scene, device = self._gbuffer.scene, self._gbuffer.scene.device
+        with budget.given_back():
+            points = others.points(scene)
+            vertices = wp.empty(points.shape[0], dtype=VirtualVertex, device=device)
+            place(points, vertices)
+            keys = wp.zeros_like(part.backs)
+            numbers = wp.array(others.numbers, dtype=wp.int32, device=device)
+            first = wp.array(others.first_vertex, dtype=wp.int32, device=device)
+            chunks = chunks_of(scene.triangle_counts[others.numbers], device)
+            inputs = [self._camera, part.points, chunks, numbers, first, vertices, scene.records]
+            launch.launch(draw_virtual, chunks.shape[0], [*inputs, scene.triangle_numbers, part.backs, keys], device)
+            first_of = np.zeros(len(scene.objects), np.int32)
+            first_of[others.numbers] = others.first_vertex
+            inputs = [self._camera, part.points, keys, part.ray_of, wp.array(first_of, dtype=wp.int32, device=device)]
+            inputs += [vertices, scene.records, scene.triangle_numbers, self._rays, self._hits]
+            launch.launch(resolve_points, keys.shape[0], inputs, device)
+
+    def draw_pieces(self, reflector: int, subdivide: Subdivide) -> None:
+        """Draw what a mirror shows of all other objects, whose triangles are first taken to pieces.
+
+        Raises:
+            InputError: the pieces need more memory than is allowed.
+        """
+        part, others = self._part(reflector, None), self._others(reflector)
+        if part is None or not len(others.numbers):
+            return
+        scene, device = self._gbuffer.scene, self._gbuffer.scene.device
+        with budget.given_back():
+            pieces, vertices = subdivide(others)
+            keys = wp.zeros_like(part.backs)
+            inputs = [self._camera, part.points, pieces, vertices, part.backs, keys]
+            launch.launch(draw_pieces, pieces.shape[0], inputs, device)
+            inputs = [self._camera, part.points, keys, part.ray_of, pieces, vertices, scene.records]
+            launch.launch(resolve_pieces, keys.shape[0], [*inputs, self._rays, self._hits], device)
+
+    @property
+    def _camera(self) -> CameraView:
+        return self._gbuffer.view.camera
+
+    def _others(self, reflector: int) -> DrawnMeshes:
+        scene = self._gbuffer.scene
         if scene.triangle_numbers.shift:
             raise InputError("the scene has more than 2^31 triangles: use method ldt or bvh")
+        return DrawnMeshes.of(scene, np.delete(np.arange(len(scene.objects), dtype=np.int32), reflector))
+
+    def _part(self, reflector: int, chosen: np.ndarray | None) -> _Part | None:
+        """The points at which a mirror is seen, or the ``chosen`` of them; None if there are none."""
         is_drawn = self._given.source.numpy() == reflector
         if chosen is not None:
             is_drawn &= chosen
         rays = np.flatnonzero(is_drawn)
-        drawn = np.delete(np.arange(len(scene.objects), dtype=np.int32), reflector)
-        if not len(rays) or not len(drawn):
-            return
+        if not len(rays):
+            return None
+        device = self._gbuffer.scene.device
         points, order = self._points(rays)
         ray_of = wp.array(order.astype(np.int32), dtype=wp.int32, device=device)
-        counts = scene.vertex_counts[drawn]
-        with budget.given_back():
-            budget.take(VERTEX_BYTES * int(counts.sum()), "the virtual vertices of the scene", "the number of vertices")
-            placed = self._room_for(drawn, counts)
-            place_vertices(placed)
-            camera = self._gbuffer.view.camera
-            keys, backs = (wp.zeros(len(order), dtype=wp.int64, device=device) for _ in range(2))
-            self._draw_backs(points, ray_of, reflector, backs)
-            chunks = chunks_of(scene.triangle_counts[drawn], device)
-            inputs = [camera, points, chunks, placed.numbers, placed.first_vertex, placed.vertices, scene.records]
-            launch.launch(draw_virtual, chunks.shape[0], [*inputs, scene.triangle_numbers, backs, keys], device)
-            first_of = np.zeros(len(scene.objects), np.int32)
-            first_of[drawn] = placed.first_vertex.numpy()
-            places = wp.array(first_of, dtype=wp.int32, device=device)
-            inputs = [camera, points, keys, ray_of, places, placed.vertices, scene.records, scene.triangle_numbers]
-            launch.launch(resolve_points, len(order), [*inputs, self._rays, self._hits], device)
-
-    def _room_for(self, drawn: np.ndarray, counts: np.ndarray) -> DrawnVertices:
-        """Room for the vertices of objects that have so many each."""
-        device = self._gbuffer.scene.device
-        first = (np.cumsum(counts) - counts).astype(np.int32)
-        return DrawnVertices(
-            drawn,
-            chunks_of(counts, device),
-            wp.array(drawn, dtype=wp.int32, device=device),
-            wp.array(first, dtype=wp.int32, device=device),
-            wp.empty(int(counts.sum()), dtype=VirtualVertex, device=device),
-        )
+        backs = wp.zeros(len(order), dtype=wp.int64, device=device)
+        self._draw_backs(points, ray_of, reflector, backs)
+        return _Part(points, ray_of, backs)
 
     def _points(self, rays: np.ndarray) -> tuple[DrawnPoints, np.ndarray]:
         """The points that these rays leave from, and (n,) the ray of each point."""

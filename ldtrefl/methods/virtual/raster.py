@@ -22,7 +22,7 @@ from ldtrefl.geometry.perspective_raster import (
     perspective_weights,
 )
 from ldtrefl.geometry.vectors import as_single, from_to
-from ldtrefl.methods.virtual.vertex import VirtualVertex, device_vertex
+from ldtrefl.methods.virtual.vertex import HIDDEN, VirtualVertex, device_vertex
 from ldtrefl.tracing.ray_buffers import HitBuffer, RayBuffer
 from ldtrefl.world.camera import CameraView
 from ldtrefl.world.records import ObjectRecord
@@ -40,6 +40,18 @@ class DrawnPoints:
     place: wp.array(dtype=wp.vec2d)  # in pixels of the band
     width: int  # pixels of a row
     rows: int
+
+
+@wp.struct
+class Piece:
+    """A part of a triangle."""
+
+    object: int
+    triangle: int
+    vertices: wp.vec3i  # numbers of its corners among all virtual vertices
+    a: wp.vec2  # barycentrics of its corners in the whole triangle: the weights of its second and third corner
+    b: wp.vec2
+    c: wp.vec2
 
 
 @wp.func
@@ -86,14 +98,10 @@ def shares_at(triangle: HomogeneousTriangle, place: wp.vec2d) -> wp.vec3:
 
 
 @wp.func
-def virtual_triangle(
-    camera: CameraView, vertices: wp.array(dtype=VirtualVertex), first: int, face: wp.vec3i
-) -> HomogeneousTriangle:
-    """The triangle between three virtual vertices of an object whose vertex 0 has place ``first``."""
+def virtual_triangle(camera: CameraView, a: VirtualVertex, b: VirtualVertex, c: VirtualVertex) -> HomogeneousTriangle:
+    """The triangle between three virtual vertices."""
     return homogeneous_triangle(
-        in_pixels(camera, vertices[first + face[0]].position),
-        in_pixels(camera, vertices[first + face[1]].position),
-        in_pixels(camera, vertices[first + face[2]].position),
+        in_pixels(camera, a.position), in_pixels(camera, b.position), in_pixels(camera, c.position)
     )
 
 
@@ -107,6 +115,12 @@ def keep_nearer_at(keys: wp.array(dtype=wp.int64), i: int, value: float, number:
 def value_in(key: wp.int64) -> float:
     """The value in a key."""
     return wp.cast(int(key >> wp.int64(32)), float)
+
+
+@wp.func
+def number_in(key: wp.int64) -> int:
+    """The number in a key."""
+    return int(key & wp.int64(0x7FFFFFFF))
 
 
 @launch.kernel
@@ -143,6 +157,39 @@ def draw_back_faces(
                                 keep_nearer_at(keys, k, nearness, 0)
 
 
+@wp.func
+def is_drawn(a: int, b: int, c: int) -> bool:
+    """Whether the triangle between vertices that are seen so is drawn."""
+    return wp.min(a, wp.min(b, c)) > 0 and wp.min(a, wp.min(b, c)) < HIDDEN
+
+
+@wp.func
+def draw_between(
+    camera: CameraView,
+    points: DrawnPoints,
+    a: VirtualVertex,
+    b: VirtualVertex,
+    c: VirtualVertex,
+    number: int,
+    backs: wp.array(dtype=wp.int64),
+    keys: wp.array(dtype=wp.int64),
+):
+    """Draw the triangle of this number between three virtual vertices."""
+    pa, pb, pc = in_pixels(camera, a.position), in_pixels(camera, b.position), in_pixels(camera, c.position)
+    box = touched_pixels(points, pa, pb, pc)
+    triangle = homogeneous_triangle(pa, pb, pc)
+    distance, depth = wp.vec3(a.distance, b.distance, c.distance), wp.vec3(a.depth, b.depth, c.depth)
+    above = wp.vec3(a.above, b.above, c.above)
+    for y in range(box.first_y, box.last_y + 1):
+        for x in range(box.first_x, box.last_x + 1):
+            pixel = y * points.width + x
+            for point in range(points.first[pixel], points.first[pixel + 1]):
+                shares = shares_at(triangle, points.place[point])
+                if shares[0] >= 0.0 and wp.dot(shares, above) >= 0.0:
+                    if value_in(backs[point]) * wp.dot(shares, depth) <= 1.0:
+                        keep_nearer_at(keys, point, 1.0 / wp.dot(shares, distance), number)
+
+
 @launch.kernel
 def draw_virtual(
     first: int,
@@ -166,23 +213,52 @@ def draw_virtual(
     for i in range(begin, wp.min(begin + CHUNK, objects[k].faces.shape[0])):
         face = objects[k].faces[i]
         a, b, c = base + face[0], base + face[1], base + face[2]
-        if vertices[a].is_seen + vertices[b].is_seen + vertices[c].is_seen == 3:
-            pa, pb = in_pixels(camera, vertices[a].position), in_pixels(camera, vertices[b].position)
-            pc = in_pixels(camera, vertices[c].position)
-            box = touched_pixels(points, pa, pb, pc)
-            triangle = homogeneous_triangle(pa, pb, pc)
-            distance = wp.vec3(vertices[a].distance, vertices[b].distance, vertices[c].distance)
-            depth = wp.vec3(vertices[a].depth, vertices[b].depth, vertices[c].depth)
-            above = wp.vec3(vertices[a].above, vertices[b].above, vertices[c].above)
-            for y in range(box.first_y, box.last_y + 1):
-                for x in range(box.first_x, box.last_x + 1):
-                    pixel = y * points.width + x
-                    for point in range(points.first[pixel], points.first[pixel + 1]):
-                        shares = shares_at(triangle, points.place[point])
-                        if shares[0] >= 0.0 and wp.dot(shares, above) >= 0.0:
-                            if value_in(backs[point]) * wp.dot(shares, depth) <= 1.0:
-                                nearness = 1.0 / wp.dot(shares, distance)
-                                keep_nearer_at(keys, point, nearness, number_of(numbers, k, i))
+        if is_drawn(vertices[a].is_seen, vertices[b].is_seen, vertices[c].is_seen):
+            number = number_of(numbers, k, i)
+            draw_between(camera, points, vertices[a], vertices[b], vertices[c], number, backs, keys)
+
+
+@launch.kernel
+def draw_pieces(
+    first: int,
+    # In:
+    camera: CameraView,
+    points: DrawnPoints,
+    pieces: wp.array(dtype=Piece),
+    vertices: wp.array(dtype=VirtualVertex),
+    backs: wp.array(dtype=wp.int64),
+    # Out:
+    keys: wp.array(dtype=wp.int64),  # of 1 / distance and the piece's number; 0 where nothing is seen
+):
+    """Draw one piece of a triangle."""
+    i = first + wp.tid()
+    a, b, c = pieces[i].vertices[0], pieces[i].vertices[1], pieces[i].vertices[2]
+    if is_drawn(vertices[a].is_seen, vertices[b].is_seen, vertices[c].is_seen):
+        draw_between(camera, points, vertices[a], vertices[b], vertices[c], i, backs, keys)
+
+
+@wp.func
+def meet_at(
+    rays: RayBuffer,
+    ray: int,
+    objects: wp.array(dtype=ObjectRecord),
+    k: int,
+    triangle: int,
+    uv: wp.vec2,
+    hits: HitBuffer,
+):
+    """Let a ray meet an object's triangle at barycentrics (u, v): it is turned there."""
+    face, u, v = objects[k].faces[triangle], wp.float64(uv[0]), wp.float64(uv[1])
+    met = (wp.float64(1.0) - u - v) * device_vertex(objects[k], face[0])
+    met += u * device_vertex(objects[k], face[1]) + v * device_vertex(objects[k], face[2])
+    way = from_to(rays.origin[ray], met)
+    length = wp.length(way)
+    if length > 0.0:
+        rays.direction[ray] = way / length
+    hits.t[ray] = length
+    hits.object[ray] = k
+    hits.triangle[ray] = triangle
+    hits.barycentrics[ray] = uv
 
 
 @launch.kernel
@@ -205,20 +281,36 @@ def resolve_points(
     """Find what one point sees in the mirror, from its key, and let its ray meet that."""
     i = first + wp.tid()
     if keys[i] != wp.int64(0):
-        number = int(keys[i] & wp.int64(0x7FFFFFFF))
+        number = number_in(keys[i])
         k = object_of(numbers, number)
         triangle = first_triangle_of(numbers, k, number)
-        face = objects[k].faces[triangle]
-        shares = shares_at(virtual_triangle(camera, vertices, first_vertex_of[k], face), points.place[i])
-        met = wp.float64(shares[0]) * device_vertex(objects[k], face[0])
-        met += wp.float64(shares[1]) * device_vertex(objects[k], face[1])
-        met += wp.float64(shares[2]) * device_vertex(objects[k], face[2])
-        ray = ray_of[i]
-        way = from_to(rays.origin[ray], met)
-        length = wp.length(way)
-        if length > 0.0:
-            rays.direction[ray] = way / length
-        hits.t[ray] = length
-        hits.object[ray] = k
-        hits.triangle[ray] = triangle
-        hits.barycentrics[ray] = wp.vec2(shares[1], shares[2])
+        face, base = objects[k].faces[triangle], first_vertex_of[k]
+        a, b, c = vertices[base + face[0]], vertices[base + face[1]], vertices[base + face[2]]
+        shares = shares_at(virtual_triangle(camera, a, b, c), points.place[i])
+        meet_at(rays, ray_of[i], objects, k, triangle, wp.vec2(shares[1], shares[2]), hits)
+
+
+@launch.kernel
+def resolve_pieces(
+    first: int,
+    # In:
+    camera: CameraView,
+    points: DrawnPoints,
+    keys: wp.array(dtype=wp.int64),
+    ray_of: wp.array(dtype=wp.int32),  # the ray that leaves the reflector at each point
+    pieces: wp.array(dtype=Piece),
+    vertices: wp.array(dtype=VirtualVertex),
+    objects: wp.array(dtype=ObjectRecord),
+    # In and out: rays where something is seen are turned to it
+    rays: RayBuffer,
+    # Out:
+    hits: HitBuffer,
+):
+    """Find which piece one point sees in the mirror, from its key, and let its ray meet that."""
+    i = first + wp.tid()
+    if keys[i] != wp.int64(0):
+        piece = pieces[number_in(keys[i])]
+        a, b, c = vertices[piece.vertices[0]], vertices[piece.vertices[1]], vertices[piece.vertices[2]]
+        shares = shares_at(virtual_triangle(camera, a, b, c), points.place[i])
+        uv = shares[0] * piece.a + shares[1] * piece.b + shares[2] * piece.c
+        meet_at(rays, ray_of[i], objects, piece.object, piece.triangle, uv, hits)

@@ -4,10 +4,11 @@ import dataclasses
 
 import numpy as np
 import pytest
+import warp as wp
 
 import ldtrefl
 from ldtrefl.base import budget
-from ldtrefl.methods.virtual.image import DrawnVertices, VirtualImage
+from ldtrefl.methods.virtual.image import VirtualImage
 from ldtrefl.tracing.nothing import no_shadows
 from tests.frame import flat_mirror
 
@@ -28,12 +29,14 @@ def test_vertices_that_are_not_seen_are_not_drawn_and_the_mirror_itself_is_never
     gbuffer, shaded = flat_mirror.seen_and_shaded(scene)
     image, asked = VirtualImage(gbuffer, shaded.rays), []
 
-    def none_is_seen(placed: DrawnVertices) -> None:
-        asked.append(placed.drawn.tolist())
-        placed.vertices.zero_()
+    def none_is_seen(points: wp.array, vertices: wp.array) -> None:
+        asked.append(points.numpy().copy())
+        vertices.zero_()
 
     image.draw(flat_mirror.GROUND, none_is_seen)
-    assert asked == [[flat_mirror.BOX]]
+    (points,) = asked
+    half = np.abs(flat_mirror.in_world(scene, points) - scene.scene.objects[flat_mirror.BOX].translate)
+    np.testing.assert_allclose(half, flat_mirror.BOX_HALF, atol=1e-6)
     reflected = image.reflected(no_shadows(scene.device))
     assert reflected.hits is not None and (reflected.hits.object == -1).all()
 

@@ -6,8 +6,7 @@ import warp as wp
 
 from ldtrefl.device import launch
 from ldtrefl.frame.projection import chunks_of
-from ldtrefl.methods.virtual.vertex import VirtualVertex, device_vertex, not_seen, unfolded, vertex_chunk
-from ldtrefl.world.records import ObjectRecord
+from ldtrefl.methods.virtual.vertex import VirtualVertex, find_points, not_seen, unfolded
 from tests.frame import flat_mirror
 
 
@@ -45,23 +44,6 @@ def test_a_path_is_unfolded_to_its_whole_length() -> None:
     assert made.numpy()["is_seen"][0] == 0
 
 
-@launch.kernel
-def copy_vertices(
-    first: int,
-    # In:
-    chunks: wp.array(dtype=wp.vec2i),
-    numbers: wp.array(dtype=wp.int32),
-    first_vertex: wp.array(dtype=wp.int32),
-    objects: wp.array(dtype=ObjectRecord),
-    # Out:
-    points_out: wp.array(dtype=wp.vec3d),
-):
-    """Copy the vertices of one chunk."""
-    chunk = vertex_chunk(chunks, numbers, first_vertex, objects, first + wp.tid())
-    for i in range(chunk.begin, chunk.end):
-        points_out[chunk.first + i] = device_vertex(objects[chunk.object], i)
-
-
 @pytest.mark.parametrize("offset", [0.0, 1e5])
 def test_chunks_hold_every_vertex_of_each_object(offset: float) -> None:
     box = (0.1 + offset, 0.5, 1.2)
@@ -71,7 +53,7 @@ def test_chunks_hold_every_vertex_of_each_object(offset: float) -> None:
     device, points = scene.device, wp.zeros(int(counts.sum()), dtype=wp.vec3d, device=scene.device)
     chunks = chunks_of(counts, device)
     arrays = [wp.array(values, dtype=wp.int32, device=device) for values in (drawn, first)]
-    launch.launch(copy_vertices, chunks.shape[0], [chunks, *arrays, scene.records, points], device)
+    launch.launch(find_points, chunks.shape[0], [chunks, *arrays, scene.records, points], device)
     found = flat_mirror.in_world(scene, points.numpy())
     for number, begin, count in zip(drawn, first, counts, strict=True):
         source = scene.scene.objects[number]
