@@ -25,6 +25,14 @@ class InputError(ValueError):
         return InputError(f"{place}: {self}")
 
 
+class NotForThisScene(InputError):
+    """A reflection method is not made for such a scene. The message names what it cannot take, and what to use."""
+
+    def within(self, place: str) -> InputError:
+        """The same error with a place in front of its message."""
+        return NotForThisScene(f"{place}: {self}")
+
+
 def printable(text: str) -> str:
     """``text`` with characters that a terminal would obey, or could not show, as escapes. Names may come from files."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
-from ldtrefl.base.errors import InputError
+from ldtrefl.base.errors import NotForThisScene
 from ldtrefl.device import launch
 from ldtrefl.device.stats import Stats
 from ldtrefl.frame.gbuffer import GBuffer
@@ -101,7 +101,7 @@ class Planar(RayMethod):
         """Draw all objects mirrored at each plane that is seen.
 
         Raises:
-            InputError: a mirror that is seen is not flat.
+            NotForThisScene: a mirror that is seen is not flat.
         """
         scene, device = self.scene, self.scene.device
         image, triangles = VirtualImage(gbuffer, rays), rays.source_triangle.numpy()
@@ -133,7 +133,7 @@ def planes_of(scene: DeviceScene, number: int) -> Planes:
     """The planes in which the triangles of a mirror lie.
 
     Raises:
-        InputError: they are too many, or its shading normals are not theirs: it is curved.
+        NotForThisScene: they are too many, or its shading normals are not theirs: it is curved.
     """
     entry, mesh = scene.objects[number], scene.meshes[scene.mesh_of[number]]
     matrix = scene.device_from_world @ scene.world_from_unit[number]
@@ -166,5 +166,5 @@ def planes_of(scene: DeviceScene, number: int) -> Planes:
     return planes
 
 
-def _curved(name: str, why: str) -> InputError:
-    return InputError(f"object '{name}': method planar is for flat mirrors, and {why}; ldt or bvh take any mirror")
+def _curved(name: str, why: str) -> NotForThisScene:
+    return NotForThisScene(f"object '{name}': method planar is for flat mirrors, and {why}; ldt or bvh take any mirror")

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from ldtrefl.base.errors import InputError, printable
+from ldtrefl.base.errors import InputError, NotForThisScene, printable
 from ldtrefl.cli.option_groups import grouped
 from ldtrefl.cli.options import Resources, Samples, SceneWanted, parsed_settings
 from ldtrefl.cli.printing import say, stage_times
@@ -20,7 +20,7 @@ from ldtrefl.files.atomic_write import writable_folder
 from ldtrefl.files.picture_writing import save_image
 from ldtrefl.frame.first_frame import foresee_a_frame
 from ldtrefl.frame.result import Frame
-from ldtrefl.methods import find_method
+from ldtrefl.methods import all_methods, find_method
 from ldtrefl.renderer import Renderer
 from ldtrefl.scene.description import MAX_SAMPLES, Scene
 
@@ -29,6 +29,9 @@ PLACE_IN_HELP = 20
 TEXEL_RESOLUTION = 256
 """Resolution of the maps whose texel is the unit of distance errors, for methods that have no such maps."""
 
+ALL = "all"
+"""Asks for every method but the truth; those that are not made for the scene are left out."""
+
 app = typer.Typer()
 
 
@@ -36,7 +39,7 @@ app = typer.Typer()
 @grouped
 def compare(
     wanted: SceneWanted,
-    methods: Annotated[str, typer.Option(help="Method names, comma-separated.")] = "ldt,envmap",
+    methods: Annotated[str, typer.Option(help="Method names, comma-separated; all: every method.")] = "ldt,envmap",
     reference: Annotated[str, typer.Option(help="The method that counts as the truth.")] = "bvh",
     output: Annotated[
         Path | None,
@@ -57,7 +60,8 @@ def compare(
     resources.use()
     device, scene = resources.device, wanted.scene
     foresee_a_frame(device)
-    names = [name.strip() for name in methods.split(",") if name.strip()]
+    takes_all = methods.strip() == ALL
+    names = [name for name in all_methods() if name != reference] if takes_all else _names_in(methods)
     options = _options_by_method(settings, [reference, *names])
     for name, count in [*((name, samples) for name in options), (reference, reference_samples)]:
         if count is not None:
@@ -65,11 +69,18 @@ def compare(
     folder = writable_folder(output or Path(scene.stem + "-compare"), make=True)
     loaded = wanted.loaded()
     rows: dict[str, Row] = {}
+    refusals: list[InputError] = []
     with progress_bar():
         _, truth = timed_frame(loaded, reference, device, options[reference])
         save_image(folder / f"{reference}.png", truth.image)
         for name in names:
-            renderer, frame = timed_frame(loaded, name, device, options[name])
+            try:
+                renderer, frame = timed_frame(loaded, name, device, options[name])
+            except NotForThisScene as refusal:
+                if not takes_all:
+                    raise
+                refusals.append(refusal)
+                continue
             resolution = options[name].get("resolution")
             texels = resolution if isinstance(resolution, int) else TEXEL_RESOLUTION
             gbuffer = None if frame.hits is None else renderer.gbuffer  # drawn again for it if the image is large
@@ -79,6 +90,8 @@ def compare(
     write_json(folder / "compare.json", str(scene), reference, rows)
     title = f"{scene} against {reference} ({truth.reflector_mask.sum()} reflector pixels)"
     say(error_table(rows, printable(title)))
+    for why in refusals:
+        say(f"left out: {why}")
     by_bounce = {name: row.bounces for name, row in rows.items() if len(row.bounces) > 1}
     if by_bounce:
         say(bounce_table(by_bounce, "where rays end, bounce by bounce"))
@@ -99,6 +112,11 @@ def timed_frame(
     Renderer(scene, method, device, **(options or {})).render()
     renderer = Renderer(scene, method, device, **(options or {}))
     return renderer, renderer.render()
+
+
+def _names_in(methods: str) -> list[str]:
+    """The names in a list with commas."""
+    return [name.strip() for name in methods.split(",") if name.strip()]
 
 
 def _options_by_method(settings: list[str] | None, names: list[str]) -> dict[str, dict[str, object]]:

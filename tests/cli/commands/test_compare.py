@@ -8,6 +8,7 @@ import numpy as np
 
 import ldtrefl
 from ldtrefl.cli.commands.compare import timed_frame
+from ldtrefl.methods import all_methods
 from tests.cli.conftest import Done
 from tests.conftest import SMALL_SCENE
 
@@ -43,6 +44,15 @@ def test_mirrors_in_mirrors_are_compared_bounce_by_bounce(run: Callable[..., Don
     compared = [row["compared"] for row in bounces]
     assert compared == sorted(compared, reverse=True) and compared[2] > 0
     assert all(row[f"wrong_{what}"] == 0 for row in bounces for what in ("hits", "misses", "objects"))
+
+
+def test_all_methods_and_those_that_refuse_the_scene(run: Callable[..., Done], scene_folder: Path) -> None:
+    done = run("compare", "scene.toml", "--methods", "all", "-o", "made", "--samples", "1")
+    report = json.loads((scene_folder / "made" / "compare.json").read_text())
+    assert done.status == 0 and set(report) == {"scene", "reference", *all_methods()} - {"bvh", "planar"}
+    assert "left out: object 'sphere': method planar is for flat mirrors" in " ".join(done.output.split())
+    alone = run("compare", "scene.toml", "--methods", "planar")
+    assert alone.status == 2 and alone.errors and "method planar is for flat mirrors" in alone.errors[0]
 
 
 def test_any_method_may_be_the_truth(run: Callable[..., Done], scene_folder: Path) -> None:
