@@ -4,8 +4,8 @@ mirrors that see themselves and one another, and peeled layers.
     python tools/readme_picture.py             # some minutes; writes five pictures into docs/
     python tools/readme_picture.py FOLDER      # the same into another folder
 
-The scenes are those of ``scenes/``, of which two of the gallery need meshes in LDTREFL_MESH_PATH; the mesh on the stages is the shape ``teapot``, and the layers those of the shape
-``genus3``.
+The scenes are those of ``scenes/``, of which two of the gallery need meshes in LDTREFL_MESH_PATH; the mesh on the
+stages is the shape ``teapot``, and the layers those of the shape ``genus3``.
 """
 
 from __future__ import annotations
