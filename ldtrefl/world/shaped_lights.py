@@ -23,7 +23,7 @@ BRIGHTEST = 1.0e30
 LARGEST = 1.0e30
 """Length in device units of what a light is wide, for the same reason."""
 
-FEWEST, MOST = 5, 64
+FEWEST, MOST = 4, 64
 """Shadow rays to a rectangle of an environment: with fewer the grain of shadows is seen, with more it is no finer than
 steps of 8 bits."""
 
