@@ -1,11 +1,11 @@
-"""Renders the README's pictures: two of the gallery, a scene with the ray-traced truth inset, a mesh on every stage,
+"""Renders the README's pictures: those of the gallery, a scene with the ray-traced truth inset, a mesh on every stage,
 mirrors that see themselves and one another, and peeled layers.
 
-    python tools/readme_picture.py             # a minute; writes five pictures into docs/
+    python tools/readme_picture.py             # some minutes; writes five pictures into docs/
     python tools/readme_picture.py FOLDER      # the same into another folder
 
-The scenes are those of ``scenes/``, the mesh on the stages is the shape ``teapot``, and the layers those of the shape
-``genus3``.
+The scenes are those of ``scenes/``, of which two of the gallery need meshes in LDTREFL_MESH_PATH; the mesh on the
+stages is the shape ``teapot``, and the layers those of the shape ``genus3``.
 """
 
 from __future__ import annotations
@@ -29,8 +29,11 @@ CROP = (slice(182, 342), slice(288, 528))
 FRAME = 3
 """Width of the inset's white frame, pixels."""
 
-GALLERY = ("photograph", "cluttered_room")
-"""Names of the scenes that the README begins with."""
+GALLERY = (("photograph", "cluttered_room", "bowl"), ("hall_of_mirrors", "chrome_statue", "chair"))
+"""Names of the scenes that the README begins with, as their pictures stand in rows."""
+
+GALLERY_SAMPLES = 16
+"""Of a pixel, at most: as pictures that are kept are rendered."""
 
 MIRRORS = (
     ("facing_balls", "linked_mirrors", "thousand_pearls"),
@@ -78,8 +81,8 @@ def picture_with_inset() -> np.ndarray:
 
 
 def picture_of_gallery() -> np.ndarray:
-    """(h, w, 3) float32: the scenes of ``GALLERY`` side by side, at their size."""
-    return _side_by_side([rendered(f"gallery/{name}") for name in GALLERY], axis=1)
+    """(h, w, 3) float32: the scenes of ``GALLERY`` at half their size."""
+    return _in_rows(tuple(tuple(f"gallery/{name}" for name in names) for names in GALLERY), GALLERY_SAMPLES)
 
 
 def picture_of_stages() -> np.ndarray:
@@ -91,18 +94,17 @@ def picture_of_stages() -> np.ndarray:
 
 def picture_of_mirrors() -> np.ndarray:
     """(h, w, 3) float32: the scenes of ``MIRRORS`` at half their size, so that each pixel is the mean of four."""
-    rows = [_side_by_side([halved(rendered(name)) for name in names], axis=1) for names in MIRRORS]
-    return _side_by_side(rows, axis=0)
+    return _in_rows(MIRRORS)
 
 
-def rendered(name: str) -> np.ndarray:
+def rendered(name: str, samples: int = 4) -> np.ndarray:
     """(h, w, 3) float32: a shipped scene."""
-    return as_shown(ldtrefl.load_scene(ROOT / "scenes" / f"{name}.toml"))
+    return as_shown(ldtrefl.load_scene(ROOT / "scenes" / f"{name}.toml"), samples)
 
 
-def as_shown(scene: ldtrefl.Scene) -> np.ndarray:
+def as_shown(scene: ldtrefl.Scene, samples: int = 4) -> np.ndarray:
     """(h, w, 3) float32: a scene as the screen shows it, by its exposure and tone mapping, in linear light."""
-    image, picture = ldtrefl.render(scene, "ldt").image, scene.picture
+    image, picture = ldtrefl.render(scene, "ldt", samples=samples).image, scene.picture
     return linear_from_srgb(shown(image, picture.exposure, picture.tone_mapping))
 
 
@@ -110,6 +112,12 @@ def halved(picture: np.ndarray) -> np.ndarray:
     """A picture of half the height and width, both even: the mean of every 2 x 2 pixels."""
     height, width, channels = picture.shape
     return picture.reshape(height // 2, 2, width // 2, 2, channels).mean(axis=(1, 3))
+
+
+def _in_rows(rows: tuple[tuple[str, ...], ...], samples: int = 4) -> np.ndarray:
+    """(h, w, 3) float32: shipped scenes at half their size, row by row."""
+    made = [[halved(rendered(name, samples)) for name in names] for names in rows]
+    return _side_by_side([_side_by_side(pictures, axis=1) for pictures in made], axis=0)
 
 
 def _side_by_side(pictures: list[np.ndarray], axis: int) -> np.ndarray:

@@ -56,6 +56,12 @@ def shadow_ray(record: ObjectRecord, surface: Surface, towards: wp.vec3, distanc
 
 
 @wp.func
+def sees_none_of_own(record: ObjectRecord, surface: Surface, towards: wp.vec3) -> bool:
+    """Whether a ray that rises from a surface cannot meet the surface's own object, as that is flat or convex."""
+    return ((record.returns >> surface.is_back) & 1) == 0 and wp.dot(towards, surface.facet) > 0.0
+
+
+@wp.func
 def lets_through(objects: wp.array(dtype=ObjectRecord), looks: Looks, k: int) -> bool:
     """Whether light may pass through an object's surface, by the alpha of its look."""
     if objects[k].look < 0:
@@ -157,7 +163,10 @@ def shaded_by(tracer: Tracer, features: ShadingFeatures) -> Callable[..., wp.vec
                         waiting += 1
                     else:
                         k = child.first
-                        shadow = shadow_ray(objects[k], surface, towards, distance, k == surface.object)
+                        is_own = k == surface.object
+                        if is_own and sees_none_of_own(objects[k], surface, towards):
+                            continue
+                        shadow = shadow_ray(objects[k], surface, towards, distance, is_own)
                         share = share * passed(views, objects, looks, k, shadow)
                         if share == 0.0:
                             return share

@@ -120,8 +120,8 @@ def find_stage(name: str) -> Callable[[Subject], Stage]:
 
 def floor_light() -> np.ndarray:
     """(3,): radiance of a white floor that all of the studio's lights reach."""
-    surroundings = soft_boxes()
-    lit = [max(light.towards[2], 0.0) * np.array(light.radiance) for light in surroundings.lights]
+    surroundings, up = soft_boxes(), np.array([[0.0, 0.0, 1.0]])
+    lit = [light.scattered_by(up)[0] for light in surroundings.rectangles]
     return np.asarray(np.array(surroundings.ambient) + np.sum(lit, axis=0))
 
 

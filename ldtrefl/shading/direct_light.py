@@ -98,8 +98,7 @@ def make_direct_radiance(share_lit: Callable[..., float], features: ShadingFeatu
                     radiance = light.radiance
                     if with_looks:
                         radiance = share * light.radiance
-                        if lighting.lights[i].is_in_picture == 0:
-                            shine += wp.cw_mul(highlights(finishes, light.towards), radiance)
+                        shine += wp.cw_mul(highlights(finishes, light.towards), radiance)
                     total += cosine * radiance
         leaving = surface.emission + wp.cw_mul(surface.albedo, total)
         if with_looks:

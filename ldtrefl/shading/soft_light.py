@@ -6,7 +6,7 @@ analytic direct illumination and stochastic shadows" (2018). So only penumbras h
 
 What rough surfaces mirror of a light is what they would mirror of its point that is nearest to the mirrored direction,
 dimmed as if the light widened the highlight; a smooth one so shows the light's shape in its own radiance. The share of
-the light that is seen is taken to be the same.
+the light that is seen is taken to be the same. A distant light is mirrored with the picture that it is part of.
 """
 
 from __future__ import annotations
@@ -39,6 +39,14 @@ class Lit:
     ambient: float  # share of ambient light that nothing close holds off
     scattered: wp.vec3  # radiance leaving a white diffuse surface
     mirrored: wp.vec3  # radiance that microfacets mirror
+
+
+@wp.func
+def way_to(light: ShapedLightRecord, position: wp.vec3d) -> wp.vec3:
+    """The way from a surface to the middle of a light; of a distant one, in distances of its middle."""
+    if light.distant != 0:
+        return wp.vec3(light.position)
+    return from_to(position, light.position)
 
 
 @wp.func
@@ -111,6 +119,8 @@ def make_share_seen(share_lit: Callable[..., float]) -> Callable[..., float]:
                 sample = sample_ambient(normal, lighting.occlusion_distance, point)
             if sample.weight > 0.0:
                 distance = BEFORE_LIGHT * sample.distance
+                if i >= 0:
+                    distance = wp.where(lighting.shaped[i].distant != 0, wp.inf, distance)
                 total += sample.weight
                 seen += sample.weight * share_lit(views, objects, top, looks, surface, sample.towards, distance)
         return wp.where(total > 0.0, seen / total, 0.0)
@@ -142,7 +152,7 @@ def make_soft_light(share_lit: Callable[..., float], features: ShadingFeatures) 
             offset = wp.vec3(0.0)
             factor = float(1.0)
             if i >= 0:
-                offset = from_to(surface.position, lighting.shaped[i].position)
+                offset = way_to(lighting.shaped[i], surface.position)
                 factor = unshadowed(lighting.shaped[i], offset, normal)
             share = float(1.0)
             if factor > 0.0 and (i < 0 or lighting.shadows != 0):
@@ -152,7 +162,7 @@ def make_soft_light(share_lit: Callable[..., float], features: ShadingFeatures) 
             elif factor > 0.0 and share > 0.0:
                 radiance = share * lighting.shaped[i].radiance
                 lit.scattered += at_most_largest(factor * radiance)
-                if with_looks:
+                if with_looks and lighting.shaped[i].distant == 0:
                     mirror = mirrored_light(finishes, lighting.shaped[i], offset)
                     lit.mirrored += at_most_largest(wp.cw_mul(mirror, radiance))
         return lit

@@ -31,7 +31,7 @@ from ldtrefl.world.object_records import fill_places, fill_records
 from ldtrefl.world.records import LightingRecord, ObjectRecord
 from ldtrefl.world.scene_looks import SceneLooks
 from ldtrefl.world.shading_features import ShadingFeatures
-from ldtrefl.world.shaped_lights import SHAPED
+from ldtrefl.world.shaped_lights import has_soft_light
 from ldtrefl.world.top_level import TopLevel, order_of, top_level
 from ldtrefl.world.triangle_numbers import MOST_NUMBERS, TriangleNumbers, numbered
 
@@ -200,7 +200,7 @@ class DeviceScene:
             looks=bool((self._records["look"] >= 0).any()),
             dimmed_shadows=lighting.is_traced and bool(self._looks.let_through(self._records["look"]).any()),
             shadows=lighting.shadows,
-            soft_light=lighting.occlusion is not None or any(light.kind in SHAPED for light in self.scene.lights),
+            soft_light=has_soft_light(self.scene),
             probes=probes,
             footprints=self._uploads.needs_footprints or probes > 0,
         )
@@ -247,7 +247,7 @@ class DeviceScene:
     def look_from(self, camera: Camera) -> None:
         """Turn the environment to the camera's ``up``. The owner of the scene does so before every frame, and makes one
         frame at a time."""
-        stand_up(self.lighting, self.scene, unit_up(camera), self.device_from_world, self.device)
+        stand_up(self.lighting, self.scene, unit_up(camera), self.device_from_world, self.samples, self.device)
 
 
 _STAMPS = itertools.count()

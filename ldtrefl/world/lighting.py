@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import warp as wp
 
@@ -10,7 +12,7 @@ from ldtrefl.scene.presets.base import DistantLight
 from ldtrefl.world.blue_noise import blue_noise
 from ldtrefl.world.environment_frame import world_from_environment
 from ldtrefl.world.records import LightingRecord, LightRecord, ShapedLightRecord
-from ldtrefl.world.shaped_lights import SHAPED, shaped_light
+from ldtrefl.world.shaped_lights import SHAPED, distant_rectangle, has_soft_light, shaped_light
 
 FARTHEST = 1e30
 """Distance in device units up to which what dims ambient light may stand: beyond all that there is."""
@@ -33,11 +35,7 @@ def lighting_of(
         before: another record with the same environment picture, which is then used again; or None.
     """
     record = LightingRecord()
-    shaped = [shaped_light(light, device_from_world) for light in scene.lights if light.kind in SHAPED]
-    # Warp makes no array of an empty list.
-    made = wp.array(shaped, dtype=ShapedLightRecord, device=device) if shaped else None
-    record.shaped = wp.empty(0, dtype=ShapedLightRecord, device=device) if made is None else made
-    noise = blue_noise() if shaped or scene.lighting.occlusion is not None else np.empty((0, 0), np.float32)
+    noise = blue_noise() if has_soft_light(scene) else np.empty((0, 0), np.float32)
     record.noise = wp.array(noise, dtype=float, device=device, copy=False)
     record.ambient = wp.vec3(*scene.ambient)
     record.sky, record.ground = wp.vec3(*scene.environment.sky), wp.vec3(*scene.environment.ground)
@@ -60,24 +58,30 @@ def lighting_of(
 
 
 def stand_up(
-    record: LightingRecord, scene: Scene, up: np.ndarray, device_from_world: np.ndarray, device: wp.Device
+    record: LightingRecord, scene: Scene, up: np.ndarray, device_from_world: np.ndarray, samples: int, device: wp.Device
 ) -> None:
-    """Turn the environment and the lights that it brings along to a camera's ``up``, a (3,) unit vector."""
+    """Turn the environment and the lights that it brings along to a camera's ``up``, a (3,) unit vector; ``samples``
+    are those of a pixel, at most."""
     if record.lights is not None and tuple(record.up) == tuple(wp.vec3(*up)):
         return
     record.up = wp.vec3(*up)
     lights = [_light(light, device_from_world) for light in scene.lights if light.kind not in SHAPED]
+    shaped = [shaped_light(light, device_from_world) for light in scene.lights if light.kind in SHAPED]
     surroundings, strength = scene.environment.surroundings, scene.environment.strength
     if surroundings is not None:
         to_world = world_from_environment(up, scene.environment.rotation)
         lights += [_distant(light, to_world, strength) for light in surroundings.lights]
+        shaped += [distant_rectangle(light, to_world, strength, samples) for light in surroundings.rectangles]
         if surroundings.disc is not None:
             record.sun = wp.vec3(*(to_world @ surroundings.disc.towards))
             record.sun_size = (2.0 * np.sin(surroundings.disc.radius / 2.0)) ** 2
             record.sun_radiance = strength * wp.vec3(*surroundings.disc.radiance)
-    record.lights = (
-        wp.array(lights, dtype=LightRecord, device=device) if lights else wp.empty(0, dtype=LightRecord, device=device)
-    )
+    record.lights, record.shaped = _on(device, lights, LightRecord), _on(device, shaped, ShapedLightRecord)
+
+
+def _on(device: wp.Device, records: list[Any], kind: type) -> wp.array:
+    """Records as an array of a device; Warp makes none of an empty list."""
+    return wp.array(records, dtype=kind, device=device) if records else wp.empty(0, dtype=kind, device=device)
 
 
 def _distant(light: DistantLight, world_from_own: np.ndarray, strength: float) -> LightRecord:
@@ -85,7 +89,6 @@ def _distant(light: DistantLight, world_from_own: np.ndarray, strength: float) -
     record = LightRecord()
     record.towards = wp.vec3(*(world_from_own @ light.towards))
     record.radiance = strength * wp.vec3(*light.radiance)
-    record.is_in_picture = int(light.is_in_picture)
     return record
 
 

@@ -15,6 +15,7 @@ import warp as wp
 
 from ldtrefl.device.struct_arrays import copy_structs
 from ldtrefl.files.stored_picture import StoredPicture
+from ldtrefl.scene.convexity import BACK, FRONT
 from ldtrefl.scene.description import Object
 from ldtrefl.scene.material import Material, is_given
 from ldtrefl.world.device_mesh import DeviceMesh
@@ -23,6 +24,9 @@ from ldtrefl.world.scene_looks import SceneLooks
 
 MOST_DOUBLINGS = 120
 """Largest exponent, up or down, of the power of two ``unit_per_device``: float32 reaches from 2^-126 to 2^127."""
+
+SMALL = 12
+"""Triangles of a box: whether a mesh of so few is flat or convex is found in no time."""
 
 
 def fill_records(
@@ -106,11 +110,14 @@ def _is_colored_by_file(materials: Sequence[Material], meshes: Sequence[DeviceMe
 
 
 def _sides_with_returns(meshes: Sequence[DeviceMesh], mesh_of: np.ndarray, is_reflector: np.ndarray) -> np.ndarray:
-    """(n,) from which sides rays can come back to each object; 0 where none leave it, because it does not mirror."""
-    of_mesh = np.zeros(len(meshes), np.int64)
-    for number in np.unique(mesh_of[is_reflector]).tolist():
+    """(n,) from which sides rays can come back to each object. Meshes of reflectors are looked at, and small ones:
+    those of floors and boxes are not asked for shadows that fall on them."""
+    is_looked_at = np.array([len(mesh.faces) <= SMALL for mesh in meshes], bool)
+    is_looked_at[mesh_of[is_reflector]] = True
+    of_mesh = np.full(len(meshes), FRONT | BACK)
+    for number in np.flatnonzero(is_looked_at).tolist():
         of_mesh[number] = meshes[number].mesh.sides_with_returns
-    return np.where(is_reflector, of_mesh[mesh_of], 0)
+    return of_mesh[mesh_of]
 
 
 def _pictures(materials: Sequence[Material]) -> tuple[list[StoredPicture | None], np.ndarray]:

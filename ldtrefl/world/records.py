@@ -32,7 +32,7 @@ class ObjectRecord:
     albedo: wp.vec3
     emission: wp.vec3  # radiance
     mirror: wp.vec3  # specular reflectance
-    returns: int  # of a reflector: from which sides rays can come back to it (``scene/convexity.py``)
+    returns: int  # from which sides rays can come back to it (``scene/convexity.py``); both if nobody looked
     part_first: wp.array(dtype=wp.int32)  # first triangle of each part
     part_color: wp.array(dtype=wp.vec3)  # linear, times albedo
     part_texture: wp.array(dtype=wp.vec4i)  # first texel, width, height, 1 for bytes; width 0 without a texture
@@ -54,7 +54,6 @@ class LightRecord:
     towards: wp.vec3  # directional: the way to the light, unit
     position: wp.vec3d  # point: where it is
     radiance: wp.vec3  # directional: as in the scene; point: intensity in device units
-    is_in_picture: int  # 1 if the environment's picture shows it: nothing mirrors it again
 
 
 SPHERE = wp.constant(0)
@@ -67,10 +66,11 @@ class ShapedLightRecord:
     """A light with a shape or a cone, in device space."""
 
     kind: int  # SPHERE, RECTANGLE or SPOT
-    position: wp.vec3d  # where its middle is
+    distant: int  # 1 for a rectangle so far away that it is seen in one direction from everywhere; the picture shows it
+    position: wp.vec3d  # where its middle is; distant: the way to it, unit
     radius: float  # sphere: of it; spot: that shadows are as soft as a sphere's; 0 for hard ones
     axis: wp.vec3  # rectangle, spot: the way that it shines, unit
-    right: wp.vec3  # rectangle: from its middle to the middle of a side
+    right: wp.vec3  # rectangle: from its middle to the middle of a side; distant: in distances of its middle
     up: wp.vec3  # rectangle: the same at right angles
     cone: wp.vec2  # spot: factor and offset of the cosine with the axis; what they give, from 0 to 1, is squared
     radiance: wp.vec3  # of its surface; spot: intensity in device units

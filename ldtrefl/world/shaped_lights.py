@@ -1,4 +1,4 @@
-"""Spheres, rectangles and spot lights on a device, in device space."""
+"""Spheres, rectangles and spot lights on a device, in device space; and an environment's rectangles, far away."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ import math
 import numpy as np
 import warp as wp
 
-from ldtrefl.scene.lights import Light
+from ldtrefl.scene.description import Light, Scene
+from ldtrefl.scene.presets.base import DistantRectangle
 from ldtrefl.world.records import RECTANGLE, SPHERE, SPOT, ShapedLightRecord
 
 SHAPED = {"sphere": int(SPHERE), "rectangle": int(RECTANGLE), "spot": int(SPOT)}
@@ -21,6 +22,19 @@ BRIGHTEST = 1.0e30
 
 LARGEST = 1.0e30
 """Length in device units of what a light is wide, for the same reason."""
+
+FEWEST, MOST = 4, 64
+"""Shadow rays to a rectangle of an environment: with fewer the grain of shadows is seen, with more it is no finer than
+steps of 8 bits."""
+
+
+def has_soft_light(scene: Scene) -> bool:
+    """Whether light of a scene needs several rays from each point, or is seen: lights with a shape or a cone, and
+    occlusion."""
+    surroundings = scene.environment.surroundings
+    is_around = surroundings is not None and len(surroundings.rectangles) > 0
+    is_own = any(light.kind in SHAPED for light in scene.lights)
+    return scene.lighting.occlusion is not None or is_own or is_around
 
 
 def shaped_light(light: Light, device_from_world: np.ndarray) -> ShapedLightRecord:
@@ -43,6 +57,28 @@ def shaped_light(light: Light, device_from_world: np.ndarray) -> ShapedLightReco
             record.samples = 1  # all of its rays would be the same
     elif light.radiance is not None:
         record.radiance = wp.vec3(*light.radiance)
+    return record
+
+
+def distant_rectangle(
+    light: DistantRectangle, world_from_own: np.ndarray, strength: float, samples: int
+) -> ShapedLightRecord:
+    """A rectangle of an environment.
+
+    Args:
+        light: at a strength of 1, in the environment's own frame.
+        world_from_own: (3, 3) the rotation of that frame.
+        strength: a factor on its radiance.
+        samples: of a pixel, at most. As many shadow rays are sent from each point: a pixel that is sampled once has the
+            grain of one that is sampled everywhere.
+    """
+    record = ShapedLightRecord()
+    record.kind, record.distant = SHAPED["rectangle"], 1
+    record.samples = min(max(samples, FEWEST), MOST)
+    record.position = wp.vec3d(*(world_from_own @ light.middle))
+    record.axis = -wp.vec3(*(world_from_own @ light.middle))
+    record.right, record.up = wp.vec3(*(world_from_own @ light.right)), wp.vec3(*(world_from_own @ light.up))
+    record.radiance = strength * wp.vec3(*light.radiance)
     return record
 
 

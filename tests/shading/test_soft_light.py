@@ -130,6 +130,55 @@ def test_a_spots_radius_softens_its_shadow_and_changes_nothing_else() -> None:
     assert 0.4 < softly[np.abs(x) < reach].mean() / hardly[(x > 0.0) & (x < reach)].mean() < 0.6
 
 
+@pytest.mark.parametrize("edge", [0.02, 0.6])
+def test_a_studio_behind_an_edge(edge: float) -> None:
+    """A plate covers x < 0 at some height: a point of the floor at x sees what of the soft boxes goes by its edge."""
+    plate = Object(shape="box", scale=(20.0, 60.0, 1e-4), translate=(-20.0, 0, edge), smooth=False)
+    camera = Camera(eye=(0, -0.3, 0.5 * edge), look_at=(0, 0, 0), height=60, width=480, fov_y=edge * 20.0)
+    studio = Environment(preset="studio", rotation=70.0, strength=0.5)
+    assert studio.surroundings is not None
+    lighting = Lighting(ambient=0.0, shadows=True)
+    given = Scene(camera=camera, environment=studio, objects=(FLOOR, plate), lighting=lighting)
+    renderer = ldtrefl.Renderer(given, "bvh", samples=64)
+    image = renderer.render().image
+    assert renderer.gbuffer is not None
+    at = renderer.gbuffer.surfaces[0].numpy().reshape(60, 480, 3)[30]
+    matrix = np.linalg.inv(renderer.gbuffer.scene.device_from_world)
+    x = at @ matrix[0, :3] + matrix[0, 3]
+    turn = np.array(
+        [[np.cos(np.radians(70)), -np.sin(np.radians(70))], [np.sin(np.radians(70)), np.cos(np.radians(70))]]
+    )
+    expected = np.zeros_like(x)
+    for light in studio.surroundings.rectangles:
+        u = (np.arange(200) + 0.5) / 100.0 - 1.0
+        ways = np.array(light.middle) + (u[:, None, None] * light.right + u[:, None] * np.array(light.up))
+        ways = ways.reshape(-1, 3)
+        area = 4.0 * np.linalg.norm(light.right) * np.linalg.norm(light.up) / len(ways)
+        square = np.vecdot(ways, ways)
+        lit = area * ways @ light.middle * ways[:, 2] / square**2 / np.pi
+        slope = (turn @ ways[:, :2].T)[0] / ways[:, 2]
+        order = np.argsort(slope)
+        seen = np.concatenate([np.cumsum(lit[order][::-1])[::-1], [0.0]])
+        expected += 0.5 * light.radiance[0] * seen[np.searchsorted(slope[order], -x / edge)]
+    assert expected.max() > 2.0 * expected.min()
+    np.testing.assert_allclose(image[30, :, 0], expected, atol=0.02 * expected.max())
+
+
+def test_studios_boxes_are_mirrored_with_the_picture_alone() -> None:
+    """A varnish that faces the key shows the picture's radiance, as one under the same picture without lights does."""
+    facet = Facet((0, 0, 1, 0), 1.0, 0.0)
+    plastic = Material(albedo=0.0, roughness=0.4, ior=1.5)
+    studio = Environment(preset="studio")
+    assert studio.surroundings is not None
+    key = studio.surroundings.rectangles[0]
+    lit = facet.seen(plastic, environment=studio, lighting=NO_LIGHT)
+    plain = Environment(preset="studio")
+    vars(plain)["surroundings"] = dataclasses.replace(studio.surroundings, rectangles=())
+    np.testing.assert_array_equal(lit, facet.seen(plastic, environment=plain, lighting=NO_LIGHT))
+    white = facet.seen(WHITE, environment=studio, lighting=NO_LIGHT)
+    assert white.min() > 0.05 * key.radiance[0]
+
+
 def test_occlusion_beside_a_wall() -> None:
     """A wall of height h hides (1 - x / sqrt(x^2 + h^2)) / 2 of the ambient light from a floor at a distance of x."""
     height = 0.5

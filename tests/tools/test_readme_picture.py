@@ -24,7 +24,7 @@ def test_pictures_of_mirrors_stand_in_rows_at_half_their_size(monkeypatch: pytes
     """Stand-ins for the rendered pictures: the mean of 0, 1, 2 and 3 quarters is 0.375 of the brightness."""
     quarters = np.tile(np.array([[0.0, 0.25], [0.5, 0.75]], np.float32), (3, 2))[..., None].repeat(3, axis=2)
     brightness = {name: k / 6 for k, name in enumerate(sum(readme_picture.MIRRORS, ()))}
-    monkeypatch.setattr(readme_picture, "rendered", lambda name: quarters * np.float32(brightness[name]))
+    monkeypatch.setattr(readme_picture, "rendered", lambda name, samples: quarters * np.float32(brightness[name]))
     picture, gap = readme_picture.picture_of_mirrors(), readme_picture.GAP
     assert picture.shape == (3 + gap + 3, 2 + gap + 2 + gap + 2, 3)
     for k in range(6):

@@ -50,3 +50,12 @@ def test_attributes_that_shading_does_not_read_are_left_out() -> None:
         assert record["normals"]["shape"][0] == count and record["uvs"]["shape"][0] == 0
         every = on_device(thing, skip_attributes=False).records.numpy()[0]
         assert every["normals"]["shape"][0] == every["uvs"]["shape"][0] == 24
+
+
+def test_floors_and_boxes_are_known_to_see_nothing_of_themselves() -> None:
+    """From outside, that is; of meshes with many triangles that is found for mirrors alone."""
+    mirror = Material(mirror=0.9)
+    shapes = [Object(shape="plane"), Object(shape="box"), Object(shape="sphere"), Object(shape="room")]
+    assert on_device(*shapes).records.numpy()["returns"].tolist() == [0, 2, 3, 1]
+    (ball,) = on_device(Object(shape="sphere", material=mirror)).records.numpy()
+    assert ball["returns"] == 2

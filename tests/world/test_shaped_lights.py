@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from ldtrefl.scene.description import Light
-from ldtrefl.world.shaped_lights import BRIGHTEST, SHAPED, shaped_light
+from ldtrefl.scene.presets.base import DistantRectangle
+from ldtrefl.world.shaped_lights import BRIGHTEST, SHAPED, distant_rectangle, shaped_light
 
 HALF = np.diag([0.5, 0.5, 0.5, 1.0])
 """A world unit is half a device unit."""
@@ -41,3 +42,15 @@ def test_the_brightest_and_the_sharpest_are_finite() -> None:
     record = shaped_light(Light(kind="spot", radius=1e15, **given), np.diag([1e15, 1e15, 1e15, 1.0]))
     assert list(record.radiance) == [np.float32(BRIGHTEST)] * 3
     assert np.isfinite([record.radius, *record.cone]).all()
+
+
+def test_a_rectangle_of_an_environment_is_turned_with_it() -> None:
+    light = DistantRectangle((0.0, 0.6, 0.8), (0.5, 0.0, 0.0), (0.0, -0.24, 0.18), (1.0, 2.0, 3.0))
+    turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    record = distant_rectangle(light, turn, 2.0, 16)
+    assert (record.kind, record.distant, record.visible, record.samples) == (SHAPED["rectangle"], 1, 0, 16)
+    assert [distant_rectangle(light, turn, 2.0, samples).samples for samples in (1, 1000)] == [4, 64]
+    np.testing.assert_allclose(record.position, (-0.6, 0.0, 0.8), atol=1e-7)
+    np.testing.assert_allclose(record.axis, (0.6, 0.0, -0.8), atol=1e-7)
+    np.testing.assert_allclose(np.cross(record.right, record.up), 0.15 * np.array(record.axis), atol=1e-7)
+    assert list(record.radiance) == [2.0, 4.0, 6.0]

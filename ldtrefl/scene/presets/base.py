@@ -15,6 +15,9 @@ from ldtrefl.files.stored_picture import StoredPicture
 
 Radiance = tuple[float, float, float]
 
+PARTS = 48
+"""Along each side of a rectangle that is summed up: the sum is right to a thousandth."""
+
 
 @dataclass(frozen=True)
 class DistantLight:
@@ -24,8 +27,33 @@ class DistantLight:
     """Unit vector to where it comes from."""
     radiance: Radiance
     """What a white surface that faces it scatters."""
-    is_in_picture: bool
-    """Whether the picture has it too, so that what mirrors the picture must not mirror the light again."""
+
+
+@dataclass(frozen=True)
+class DistantRectangle:
+    """A rectangle that glows evenly and is in the picture, too: what is matt is lit by it, and what mirrors shows the
+    picture."""
+
+    middle: tuple[float, float, float]
+    """Unit vector to its middle, which it faces."""
+    right: tuple[float, float, float]
+    """From its middle to the middle of a side, in distances of its middle."""
+    up: tuple[float, float, float]
+    """The same at right angles."""
+    radiance: Radiance
+    """Of its surface."""
+
+    def scattered_by(self, normals: np.ndarray) -> np.ndarray:
+        """(n, 3) radiance of white surfaces whose unit normals are (n, 3), without shadows: the sum over its parts."""
+        along = (np.arange(PARTS) + 0.5) / PARTS * 2.0 - 1.0
+        across, above = np.meshgrid(along, along)
+        to_part = np.array(self.middle) + np.multiply.outer(across, self.right) + np.multiply.outer(above, self.up)
+        to_part = to_part.reshape(-1, 3)
+        area = 4.0 * np.linalg.norm(np.cross(self.right, self.up)) / PARTS**2
+        # The part's cosine with the way to it, over the square of its distance, and so that the way gets unit length.
+        weight = area * (to_part @ self.middle) / np.vecdot(to_part, to_part) ** 2
+        factor = np.maximum(normals @ to_part.T, 0.0) @ weight / np.pi
+        return np.asarray(factor[:, None] * self.radiance)
 
 
 @dataclass(frozen=True)
@@ -46,8 +74,9 @@ class Surroundings:
     picture: StoredPicture
     """float32."""
     ambient: Radiance
-    """The picture's mean over all directions, without what ``lights`` stand for: ambient light in its place."""
-    lights: tuple[DistantLight, ...]
+    """The picture's mean over all directions, without what lights stand for: ambient light in its place."""
+    lights: tuple[DistantLight, ...] = ()
+    rectangles: tuple[DistantRectangle, ...] = ()
     disc: Disc | None = None
 
 

@@ -3,6 +3,10 @@
 Luminance and chromaticity of a direction are those of the zenith (appendix A.2) times the formula of Perez (equation 3)
 for the angles from the zenith and from the sun, over what the formula gives at the zenith. *Turbidity* says how hazy
 the air is: 2 is clear, 3 usual, 6 hazy; the model was fitted from 2 to 6.
+
+Its fit of chromaticity makes the sky purple near the horizon where the sun is high. Daylight as it was measured lies
+about a curve, the CIE daylight locus. So what the model has on the purple side of that curve is put on it, with its x
+and its luminance; elsewhere all is the model's own.
 """
 
 from __future__ import annotations
@@ -56,6 +60,12 @@ def perez(name: str, turbidity: float, cosine: np.ndarray, from_sun: np.ndarray)
     return np.asarray(by_height * (1.0 + c * np.exp(d * from_sun) + e * np.cos(from_sun) ** 2))
 
 
+def daylight_y(x: np.ndarray) -> np.ndarray:
+    """CIE 1931 y of daylight of this x: D. B. Judd, D. L. MacAdam, G. Wyszecki, "Spectral Distribution of Typical
+    Daylight as a Function of Correlated Color Temperature" (1964), as CIE 15 has it."""
+    return np.asarray((-3.0 * x + 2.87) * x - 0.275)
+
+
 def sky_xyz(directions: np.ndarray, sun: np.ndarray, turbidity: float) -> np.ndarray:
     """CIE 1931 XYZ of the sky in kcd/m^2.
 
@@ -75,5 +85,6 @@ def sky_xyz(directions: np.ndarray, sun: np.ndarray, turbidity: float) -> np.nda
     for name, at_zenith in (("Y", zenith_luminance(from_zenith, turbidity)), ("x", x), ("y", y)):
         there = float(perez(name, turbidity, np.ones(()), np.full((), from_zenith)))
         found[name] = at_zenith / there * perez(name, turbidity, cosine, from_sun)
+    found["y"] = np.maximum(found["y"], daylight_y(found["x"]))
     scale = found["Y"] / found["y"]
     return np.stack([found["x"] * scale, found["Y"], (1.0 - found["x"] - found["y"]) * scale], axis=-1)

@@ -62,9 +62,9 @@ def sky(elevation: float, azimuth: float, turbidity: float, ground_albedo: Radia
     pixels = (scale * pixels).astype(np.float32)
     seen = scale * sun / np.sin(SUN_RADIUS) ** 2
     seen *= min(1.0, BRIGHTEST / float(seen.max()))
-    light = DistantLight(three(to_sun), three(scale * sun), is_in_picture=False)
+    light = DistantLight(three(to_sun), three(scale * sun))
     disc = Disc(three(to_sun), float(SUN_RADIUS), three(seen))
-    return Surroundings(StoredPicture(pixels), three(scale * ambient), (light,), disc)
+    return Surroundings(StoredPicture(pixels), three(scale * ambient), (light,), disc=disc)
 
 
 def _ground(above: np.ndarray, from_sun: np.ndarray, albedo: Radiance) -> np.ndarray:

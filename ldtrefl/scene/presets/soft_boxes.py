@@ -1,9 +1,8 @@
 """The preset "studio": a dim room with soft boxes, as for photographs of things that gleam.
 
 The camera is taken to stand at azimuth -90 degrees (-y), or up to a third of a right angle beside it. Each box is seen
-in mirrors as it is. What is matt gets the light of the key and of the overhead box from four directions about the
-middle of each, so that shadows are few and have a soft edge; that of the others, like that of the walls, is ambient
-light.
+in mirrors as it is. What is matt gets the light of the key and of the overhead box from rectangles of their size, which
+glow evenly and give as much light as the boxes; that of the others, like that of the walls, is ambient light.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ import numpy as np
 
 from ldtrefl.files.stored_picture import StoredPicture
 from ldtrefl.scene.presets.base import (
-    DistantLight,
+    DistantRectangle,
     Surroundings,
     direction,
     mean_radiance,
@@ -39,17 +38,16 @@ class Box:
     """Half of it, as seen from the middle of the room: the tangent of an angle."""
     height: float
     radiance: tuple[float, float, float]
-    spread: float = 0.0
-    """Degrees from its middle to each of four lights that stand for it, up or down and right or left; if 0, its light
-    is part of the ambient light."""
+    casts_shadows: bool = False
+    """If not, its light is part of the ambient light."""
 
 
 BOXES = (
-    Box(-36.0, 38.0, 0.44, 0.44, (2.95, 2.88, 2.76), spread=3.0),  # key
+    Box(-36.0, 38.0, 0.44, 0.44, (2.95, 2.88, 2.76), casts_shadows=True),  # key
     Box(-162.0, 27.0, 0.34, 0.58, (0.66, 0.69, 0.74)),  # fill
     Box(40.0, 18.0, 0.1, 0.5, (2.0, 2.0, 2.05)),  # rims
     Box(150.0, 20.0, 0.1, 0.5, (1.9, 1.9, 1.95)),
-    Box(90.0, 80.0, 0.6, 0.22, (2.7, 2.7, 2.7), spread=5.0),  # overhead
+    Box(90.0, 80.0, 0.6, 0.22, (2.7, 2.7, 2.7), casts_shadows=True),  # overhead
 )
 
 EDGE = 0.03
@@ -80,16 +78,16 @@ def studio() -> Surroundings:
     directions = picture_directions(ROWS)
     pixels = _room(directions)
     ambient = mean_radiance(pixels)
-    lights: list[DistantLight] = []
+    rectangles: list[DistantRectangle] = []
     for box in BOXES:
         rows, columns, glow = _glow(box, directions)
         pixels[rows, columns] += glow
-        received = (glow * solid_angles(ROWS)[rows]).sum(axis=0, dtype=float) / np.pi
-        if box.spread > 0.0:
-            lights += _lights(box, received)
+        light = (glow * solid_angles(ROWS)[rows]).sum(axis=0, dtype=float)
+        if box.casts_shadows:
+            rectangles.append(_rectangle(box, light))
         else:
-            ambient += 0.25 * received
-    return Surroundings(StoredPicture(pixels), three(ambient), tuple(lights))
+            ambient += light / (4.0 * np.pi)
+    return Surroundings(StoredPicture(pixels), three(ambient), rectangles=tuple(rectangles))
 
 
 def _room(directions: np.ndarray) -> np.ndarray:
@@ -126,15 +124,10 @@ def _frame(box: Box) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return ahead, right, np.cross(right, ahead)
 
 
-def _lights(box: Box, received: np.ndarray) -> list[DistantLight]:
-    """What stands for a box, of which a white surface that faces it scatters ``received``."""
+def _rectangle(box: Box, light: np.ndarray) -> DistantRectangle:
+    """What stands for a box whose radiance, summed up over its solid angle, is ``light``: its edge is where the box's
+    rim is half as bright."""
     ahead, right, up = _frame(box)
-    aside = np.tan(np.radians(box.spread))
-    corners = [(x, y) for x in (-aside, aside) for y in (-aside, aside)]
-    made = []
-    for x, y in corners:
-        towards = ahead + x * right + y * up
-        towards /= np.sqrt(np.vecdot(towards, towards))
-        radiance = received / len(corners)
-        made.append(DistantLight(three(towards), three(radiance), is_in_picture=True))
-    return made
+    width, height = box.width - 0.5 * EDGE, box.height - 0.5 * EDGE
+    solid_angle = 4.0 * np.arcsin(width * height / np.sqrt((1.0 + width**2) * (1.0 + height**2)))
+    return DistantRectangle(three(ahead), three(width * right), three(height * up), three(light / solid_angle))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ldtrefl.scene.presets.preetham import perez, sky_xyz, zenith_chromaticity, zenith_luminance
+from ldtrefl.scene.presets.preetham import daylight_y, perez, sky_xyz, zenith_chromaticity, zenith_luminance
 
 
 def at(elevation: float, azimuth: float = 0.0) -> np.ndarray:
@@ -49,6 +49,7 @@ def test_the_zenith_is_what_the_paper_says_it_is() -> None:
     sun = at(40.0, 70.0)
     xyz = sky_xyz(at(90.0)[None], sun, 2.5)[0]
     x, y = zenith_chromaticity(np.radians(50.0), 2.5)
+    assert y > daylight_y(np.array(x)), "it is left as it is"
     np.testing.assert_allclose(xyz[:2] / xyz.sum(), [x, y], rtol=1e-9)
     assert xyz[1] == pytest.approx(zenith_luminance(np.radians(50.0), 2.5), rel=1e-9)
 
@@ -60,3 +61,26 @@ def test_it_is_brightest_at_the_sun_and_alike_on_both_sides_of_it() -> None:
     )
     np.testing.assert_allclose(left, right, rtol=1e-9)
     assert towards[1] > left[1] > opposite[1] > 0.0
+
+
+def test_daylight() -> None:
+    """CIE 15, chromaticities of the illuminants D50, D55, D65 and D75."""
+    x, y = np.array([(0.3457, 0.3585), (0.3324, 0.3474), (0.3127, 0.3290), (0.2990, 0.3149)]).T
+    np.testing.assert_allclose(daylight_y(x), y, atol=3e-4)
+
+
+@pytest.mark.parametrize("turbidity", [2.0, 2.2, 3.0, 6.0])
+@pytest.mark.parametrize("elevation", [8.0, 42.0, 80.0])
+def test_no_sky_is_purple(elevation: float, turbidity: float) -> None:
+    """No chromaticity is on the purple side of daylight's, and luminance is the model's own."""
+    azimuths, heights = np.meshgrid(np.arange(0.0, 360.0, 30.0), np.array([0.5, 2.0, 5.0, 10.0, 30.0, 60.0, 90.0]))
+    ways = np.stack([at(*pair) for pair in zip(heights.ravel(), azimuths.ravel(), strict=True)])
+    xyz = sky_xyz(ways, at(elevation), turbidity)
+    x, y = (xyz[:, :2] / xyz.sum(axis=1, keepdims=True)).T
+    assert (y >= daylight_y(x) - 1e-12).all()
+    sun = np.arccos(np.clip(ways @ at(elevation), -1.0, 1.0))
+    there = perez("Y", turbidity, np.ones(()), np.radians(np.full((), 90.0 - elevation)))
+    expected = (
+        zenith_luminance(np.radians(90.0 - elevation), turbidity) / there * perez("Y", turbidity, ways[:, 2], sun)
+    )
+    np.testing.assert_allclose(xyz[:, 1], expected, rtol=1e-9)
