@@ -35,6 +35,8 @@ def beyond(schema: dict[str, Any]) -> object:
     """A value above the limits of a parameter."""
     if "prefixItems" in schema:
         return [beyond(entry) for entry in schema["prefixItems"]]
+    if "items" in schema:
+        return [beyond(schema["items"])] * schema["minItems"]
     return {"boolean": 1, "integer": 10**9, "number": 1e30}[schema["type"]]
 
 
