@@ -23,7 +23,7 @@ from ldtrefl.device.bins import CHUNK
 from ldtrefl.device.stats import Stats
 from ldtrefl.frame.projection import chunks_of
 from ldtrefl.methods.virtual.image import VERTEX_BYTES, DrawnMeshes, PlaceVertices
-from ldtrefl.methods.virtual.raster import Piece
+from ldtrefl.methods.virtual.raster import Piece, in_pixels
 from ldtrefl.methods.virtual.vertex import VirtualVertex
 from ldtrefl.world.camera import CameraView
 from ldtrefl.world.device_scene import DeviceScene
@@ -31,6 +31,10 @@ from ldtrefl.world.records import ObjectRecord
 
 PIECE_BYTES = 56
 """Bytes of a piece and of its errors."""
+
+LEAST_LENGTH = wp.constant(1.0)
+"""Pixels: an edge that is shorter in the image has no error. Else fine meshes would be divided for nothing where what
+is reflected ends."""
 
 SMALLER = "levels, or a larger threshold"
 """What an error names for the user to change."""
@@ -57,6 +61,15 @@ class Subdivision:
     """Whether edges are divided each by its own error."""
 
 
+@wp.func
+def apart_in_pixels(camera: CameraView, a: wp.vec3d, b: wp.vec3d) -> float:
+    """Pixels between two points in the image; +inf if one is not in front of the camera."""
+    p, q = in_pixels(camera, a), in_pixels(camera, b)
+    if p[2] <= wp.float64(0.0) or q[2] <= wp.float64(0.0):
+        return wp.inf
+    return float(wp.length(wp.vec2d(p[0] / p[2] - q[0] / q[2], p[1] / p[2] - q[1] / q[2])))
+
+
 @launch.once
 def edge_errors_kernel(reflector: type, surface_at: Callable[..., SurfacePoint]) -> wp.Kernel:
     """The kernel that finds the errors of pieces' edges. ``surface_at(reflector, camera, point)`` is the reflector's
@@ -66,6 +79,8 @@ def edge_errors_kernel(reflector: type, surface_at: Callable[..., SurfacePoint])
     def edge_error(
         camera: CameraView, mirror: reflector, a: VirtualVertex, b: VirtualVertex, from_a: wp.vec3d, from_b: wp.vec3d
     ) -> float:
+        if apart_in_pixels(camera, a.position, b.position) < LEAST_LENGTH:
+            return 0.0
         if a.is_seen != b.is_seen:
             return 1.0  # the border of what is reflected lies between
         half = wp.float64(0.5)
