@@ -157,4 +157,4 @@ def star_shape_of(reflector: DeviceObject, device_from_world: np.ndarray) -> Sta
     normals = None
     if reflector.source.smooth is not False:
         normals = mesh.normals.astype(float) @ np.linalg.inv(linear) * abs(np.linalg.det(linear)) ** (1.0 / 3.0)
-    return star_shape(vertices, mesh.faces, normals, f"object '{reflector.source.name}'")
+    return star_shape(vertices, mesh.faces, normals, f"object '{reflector.source.called}'")
