@@ -35,6 +35,19 @@ from collections.abc import Callable
 import warp as wp
 
 from ldtrefl.device import launch
+from ldtrefl.methods.virtual.fermat_samples import (
+    HALF,
+    ONE,
+    ZERO,
+    Sample,
+    Samples,
+    largest_gradient,
+    residual_angle,
+    sample_of,
+    smallest_gradient,
+    weights_of_zero,
+    with_replaced,
+)
 from ldtrefl.methods.virtual.radius_map import RadialPoint
 
 LEAST_SINE = wp.constant(wp.float64(1.0e-12))
@@ -59,12 +72,6 @@ MOST_TRIES = wp.constant(6)
 MUCH = wp.constant(wp.float64(4.0))
 """A step is too long if the gradient is so many times the smallest yet. With 1 near ones are halved for nothing."""
 
-GRAZING = wp.constant(wp.float64(0.125))
-"""Weight of what is added to e for grazing incidence. With 0.02 some are not found; at 0.5 wide angles take longer."""
-
-HALF = wp.constant(wp.float64(0.5))
-ONE = wp.constant(wp.float64(1.0))
-ZERO = wp.constant(wp.float64(0.0))
 EQUILATERAL = wp.constant(wp.float64(0.8660254037844386))
 """Height of an equilateral triangle of side 1."""
 
@@ -88,138 +95,26 @@ class Reflection:
     residual: wp.float64  # radians between the mirrored view and the way to the vertex
     iterations: int  # samples taken after the first three, and returns to discarded ones
     is_found: int  # 1 if the residual is small, and E and V are on the side of the surface that E is on
-
-
-@wp.struct
-class Sample:
-    """A point of the surface, and the gradient of the path's length there."""
-
-    point: wp.vec3d
-    gradient: wp.vec3d  # of the path's length, made more linear
-    normal: wp.vec3d  # away from O, unit
-    radius: wp.float64  # 0 if there is no surface
-    tries: int  # samples that were taken for this one
-
-
-@wp.struct
-class Samples:
-    """The triangle of samples of a search."""
-
-    a: Sample
-    b: Sample
-    c: Sample
-    discarded: Sample  # most recently
-    has_discarded: int
-    newest: int  # which was added last, 0 to 2; -1 at the start
+    is_hidden: int  # 1 if it is small, and both are on the other side: the surface hides V from E
 
 
 @wp.func
-def path_gradient(point: wp.vec3d, normal: wp.vec3d, eye: wp.vec3d, vertex: wp.vec3d) -> wp.vec3d:
-    """The gradient of the path's length ``EP + PV`` along a surface with this unit normal."""
-    e = wp.normalize(point - eye) + wp.normalize(point - vertex)
-    return e - wp.dot(e, normal) * normal
+def is_settled(samples: Samples, eye: wp.vec3d, vertex: wp.vec3d, limits: SearchLimits) -> bool:
+    """Whether a search has ended: the triangle of samples is small, and the best of them mirrors.
 
-
-@wp.func
-def grazing_gradient(point: wp.vec3d, normal: wp.vec3d, eye: wp.vec3d, vertex: wp.vec3d) -> wp.vec3d:
-    """What is added to it: ``(d . n) d_t / 8``."""
-    d = wp.normalize(point - eye) - wp.normalize(point - vertex)
-    along = wp.dot(d, normal)
-    return GRAZING * along * (d - along * normal)
-
-
-@wp.func
-def sample_of(direction: wp.vec3d, at: RadialPoint, eye: wp.vec3d, vertex: wp.vec3d) -> Sample:
-    """The sample in a unit direction, where the surface is ``at``."""
-    sample = Sample()
-    if at.radius > ZERO:
-        sample.radius = at.radius
-        sample.point = at.radius * direction
-        sample.normal = wp.normalize(direction - at.gradient / at.radius)
-        to_eye, to_vertex = wp.length(eye - sample.point), wp.length(vertex - sample.point)
-        factor = to_eye * to_vertex / (to_eye + to_vertex)
-        gradient = path_gradient(sample.point, sample.normal, eye, vertex)
-        sample.gradient = factor * (gradient + grazing_gradient(sample.point, sample.normal, eye, vertex))
-    return sample
-
-
-@wp.func
-def weights_of_zero(a: wp.vec3d, b: wp.vec3d, c: wp.vec3d) -> wp.vec3d:
-    """Weights (alpha, beta) of A and B where the gradient interpolated between a, b and c is smallest, by least squares
-    (section 3.3.3), and the determinant of their equations over the product of its diagonal."""
-    a_c, b_c = a - c, b - c
-    aa, ab, bb = wp.dot(a_c, a_c), wp.dot(a_c, b_c), wp.dot(b_c, b_c)
-    ac, bc = wp.dot(a_c, c), wp.dot(b_c, c)
-    determinant = aa * bb - ab * ab
-    if not determinant > ZERO:
-        return wp.vec3d(ZERO, ZERO, ZERO)
-    return wp.vec3d((ab * bc - bb * ac) / determinant, (ab * ac - aa * bc) / determinant, determinant / (aa * bb))
-
-
-@wp.func
-def with_replaced(samples: Samples, which: int, new: Sample) -> Samples:
-    """The triangle with one sample replaced, which is then the discarded one."""
-    changed = samples
-    if which == 0:
-        changed.discarded = samples.a
-        changed.a = new
-    elif which == 1:
-        changed.discarded = samples.b
-        changed.b = new
-    else:
-        changed.discarded = samples.c
-        changed.c = new
-    changed.has_discarded = 1
-    changed.newest = which
-    return changed
-
-
-@wp.func
-def largest_gradient(samples: Samples, other_than: int) -> int:
-    """Which sample has the largest gradient: 0 for A, 1 for B, 2 for C. ``other_than`` is passed over; -1 for none."""
-    which, largest = int(0), wp.float64(-1.0)
-    if other_than != 0:
-        largest = wp.length(samples.a.gradient)
-    if other_than != 1 and wp.length(samples.b.gradient) > largest:
-        which = int(1)
-        largest = wp.length(samples.b.gradient)
-    if other_than != 2 and wp.length(samples.c.gradient) > largest:
-        which = int(2)
-    return which
-
-
-@wp.func
-def smallest_gradient(samples: Samples) -> Sample:
-    """The sample with the smallest gradient."""
-    best = samples.a
-    if wp.length(samples.b.gradient) < wp.length(best.gradient):
-        best = samples.b
-    if wp.length(samples.c.gradient) < wp.length(best.gradient):
-        best = samples.c
-    return best
-
-
-@wp.func
-def is_small(samples: Samples, eye: wp.vec3d, limits: SearchLimits) -> bool:
-    """Whether the triangle of samples is small enough for the search to end, or a sample is the reflection."""
+    The paper asks for a small area alone. A flat triangle has none, however long it is; and near the silhouette, where
+    the surface is seen edge-on, a small part of a pixel is a long way.
+    """
     best = smallest_gradient(samples)
     if wp.length(best.gradient) <= ROUNDING * best.radius:
         return True
     a, b, c = samples.a.point, samples.b.point, samples.c.point
     across = wp.cross(b - a, c - a)
-    if HALF * wp.length(across) <= limits.least_area * wp.dot(a, a):
-        return True
     lengths = wp.length(a - eye) * wp.length(b - eye) * wp.length(c - eye)
-    return HALF * wp.abs(wp.dot(across, a - eye)) <= limits.least_solid_angle * lengths
-
-
-@wp.func
-def residual_angle(point: wp.vec3d, normal: wp.vec3d, eye: wp.vec3d, vertex: wp.vec3d) -> wp.float64:
-    """Radians between the view of a point, mirrored at its unit normal, and the way from it to the vertex."""
-    view = wp.normalize(point - eye)
-    mirrored = view - wp.float64(2.0) * wp.dot(view, normal) * normal
-    half_chord = HALF * wp.length(mirrored - wp.normalize(vertex - point))
-    return wp.float64(2.0) * wp.asin(wp.min(half_chord, ONE))
+    if HALF * wp.length(across) > limits.least_area * wp.length_sq(a):
+        if HALF * wp.abs(wp.dot(across, a - eye)) > limits.least_solid_angle * lengths:
+            return False
+    return residual_angle(best.point, best.normal, eye, vertex) <= limits.most_residual
 
 
 @wp.func
@@ -256,14 +151,15 @@ def reflection_of(
     found.normal = best.normal
     found.residual = residual_angle(found.point, found.normal, eye, vertex)
     of_eye, of_vertex = wp.dot(found.normal, eye - found.point), wp.dot(found.normal, vertex - found.point)
-    if of_eye * of_vertex > ZERO and of_eye * side >= ZERO and found.residual <= limits.most_residual:
-        found.is_found = 1
+    if of_eye * of_vertex > ZERO and found.residual <= limits.most_residual:
+        found.is_found = wp.where(of_eye * side >= ZERO, 1, 0)
+        found.is_hidden = 1 - found.is_found
     return found
 
 
 @launch.once
 def sampler(surface_type: type, radial_point: Callable[..., RadialPoint]) -> Callable[..., Sample]:
-    """The function ``sampled(surface, direction, eye, vertex) -> Sample`` of a kind of surface."""
+    """``sampled(surface, direction, eye, vertex) -> Sample`` of a kind of surface."""
 
     @wp.func
     def sampled(surface: surface_type, direction: wp.vec3d, eye: wp.vec3d, vertex: wp.vec3d) -> Sample:
@@ -274,7 +170,7 @@ def sampler(surface_type: type, radial_point: Callable[..., RadialPoint]) -> Cal
 
 @launch.once
 def starter(surface_type: type, radial_point: Callable[..., RadialPoint]) -> Callable[..., Samples]:
-    """The function ``first_samples(surface, eye, vertex) -> Samples`` of a kind of surface."""
+    """``first_samples(surface, eye, vertex) -> Samples`` of a kind of surface."""
 
     sampled = sampler(surface_type, radial_point)
 
@@ -328,7 +224,7 @@ def starter(surface_type: type, radial_point: Callable[..., RadialPoint]) -> Cal
 
 @launch.once
 def stepper(surface_type: type, radial_point: Callable[..., RadialPoint]) -> Callable[..., Sample]:
-    """The function ``next_sample(surface, samples, weights, eye, vertex, most_tries) -> Sample`` of a kind of surface."""
+    """``next_sample(surface, samples, weights, eye, vertex, most_tries) -> Sample`` of a kind of surface."""
 
     sampled = sampler(surface_type, radial_point)
 
@@ -381,7 +277,7 @@ def fermat_search(surface_type: type, radial_point: Callable[..., RadialPoint]) 
                 goes_on = sample.radius > ZERO
                 if goes_on:
                     samples = with_replaced(samples, largest_gradient(samples, -1), sample)
-                    goes_on = not is_small(samples, eye, limits)
+                    goes_on = not is_settled(samples, eye, vertex, limits)
             elif samples.has_discarded != 0:
                 # Go back in time: not to the newest sample's place, or that would go on for ever.
                 iterations += 1

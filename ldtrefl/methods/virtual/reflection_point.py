@@ -10,7 +10,7 @@ Alhazen's problem. The search is that of ``methods/virtual/fermat_search.py``.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import warp as wp
@@ -28,8 +28,9 @@ from ldtrefl.scene.mesh import Mesh
 MOST_ITERATIONS = 20
 """Of a search: what Roger and Holzschuch (2006) see at grazing incidence."""
 
-LEAST_AREA = 1e-18
-"""Area of the triangle of samples, over the radius squared, at which a search ends: the error is of its order."""
+LEAST_AREA = 1e-14
+"""Area of the triangle of samples, over the radius squared, at which a search ends. The next sample's error is of its
+order."""
 
 MOST_RESIDUAL = 1e-5
 """Radians. On a convex mirror the normal turns as far as the point moves, and the mirrored view twice as far."""
@@ -181,7 +182,12 @@ def _on_mesh(eyes: np.ndarray, points: np.ndarray, mesh: Mesh) -> ReflectionPoin
     middle, half = mesh.unit_frame
     shape = star_shape((mesh.vertices - middle) / half, mesh.faces, mesh.normals.astype(float), "the mesh")
     surface = shape.radius_map(INTERVALS, launch.resolve_device(None))
-    return _found(find_on_map, surface, eyes, points, middle + half * shape.centre, half)
+    found = _found(find_on_map, surface, eyes, points, middle + half * shape.centre, half)
+    # The map goes on beyond the rim of an open mesh.
+    ways = (found.points - middle) / half - shape.centre
+    lengths = np.linalg.norm(ways, axis=1, keepdims=True)
+    radii, _ = shape.radii(ways / np.where(lengths > 0.0, lengths, 1.0))
+    return replace(found, converged=found.converged & (radii > 0.0))
 
 
 def _found(

@@ -18,10 +18,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import warp as wp
-from scipy.spatial import cKDTree
 
-from ldtrefl.base.errors import InputError
+from ldtrefl.base.errors import NotForThisScene
 from ldtrefl.methods.virtual.radius_map import RadiusMap, node_directions
+from ldtrefl.methods.virtual.rim import continue_beyond_rim
 from ldtrefl.methods.virtual.star_centre import LEAST_COSINE, star_centre
 from ldtrefl.tracing.bvh import Raycaster
 from ldtrefl.world.device_object import DeviceObject
@@ -29,10 +29,6 @@ from ldtrefl.world.device_object import DeviceObject
 NEARER = 1e-3
 """Share of a distance by which something else must be nearer to O to hide a triangle: rays to the middles of triangles
 are rounded, and may meet the neighbour instead."""
-
-RIM = 2.0
-"""How far beyond the rim of an open surface its map is continued, in intervals between nodes: the texels that the rim
-crosses have values, and so has what the search passes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +86,7 @@ class StarShape:
         """r and its gradient on a device, sampled at the nodes of a cube map with this many intervals a side."""
         directions = node_directions(intervals)
         radii, gradients = self.radii(directions)
-        _continue_beyond_rim(directions, radii, gradients, reach=RIM * 2.0 / intervals)
+        continue_beyond_rim(directions, radii, gradients, self.radii)
         surface = RadiusMap()
         surface.centre, surface.intervals = wp.vec3d(*self.centre), intervals
         values = np.concatenate([radii[:, None], gradients], axis=1).astype(np.float32)
@@ -107,20 +103,6 @@ def _relative_gradients(normals: np.ndarray, ways: np.ndarray) -> np.ndarray:
     return -across / np.where(np.abs(along) < least, np.copysign(least, along), along)[:, None]
 
 
-def _continue_beyond_rim(directions: np.ndarray, radii: np.ndarray, gradients: np.ndarray, reach: float) -> None:
-    """Give nodes that meet nothing, but are no farther than ``reach`` from one that does, linearly continued values."""
-    is_met = radii > 0.0
-    if is_met.all() or not is_met.any():
-        return
-    missing, met = np.flatnonzero(~is_met), np.flatnonzero(is_met)
-    distances, nearest = cKDTree(directions[met]).query(directions[missing], distance_upper_bound=reach)
-    rim, source = missing[np.isfinite(distances)], met[nearest[np.isfinite(distances)]]
-    steps = np.einsum("ij,ij->i", gradients[source], directions[rim] - directions[source])
-    radii[rim] = radii[source] * np.exp(steps / radii[source])  # never negative
-    along = np.einsum("ij,ij->i", gradients[source], directions[rim])
-    gradients[rim] = gradients[source] - along[:, None] * directions[rim]
-
-
 def star_shape(vertices: np.ndarray, faces: np.ndarray, normals: np.ndarray | None, name: str) -> StarShape:
     """A mesh as a star-shaped surface.
 
@@ -131,23 +113,21 @@ def star_shape(vertices: np.ndarray, faces: np.ndarray, normals: np.ndarray | No
         name: what the error calls the mesh.
 
     Raises:
-        InputError: there is no point that sees all of it.
+        NotForThisScene: there is no point that sees all of it.
     """
     centre = star_centre(vertices, faces)
     if centre is not None:
         shape = StarShape(centre, vertices - centre, faces, normals)
         if not shape.hides_itself():
             return shape
-    raise InputError(
-        f"{name} is not star-shaped: from no point all of its surface is seen; use the method 'ldt' or 'bvh'"
-    )
+    raise NotForThisScene(f"{name} is not star-shaped: from no point all of its surface is seen")
 
 
 def star_shape_of(reflector: DeviceObject, device_from_world: np.ndarray) -> StarShape:
     """A placed object as a star-shaped surface of device space.
 
     Raises:
-        InputError: it is not star-shaped.
+        NotForThisScene: it is not star-shaped.
     """
     device_from_unit = device_from_world @ reflector.world_from_unit
     linear, shift = device_from_unit[:3, :3], device_from_unit[:3, 3]
@@ -157,4 +137,7 @@ def star_shape_of(reflector: DeviceObject, device_from_world: np.ndarray) -> Sta
     normals = None
     if reflector.source.smooth is not False:
         normals = mesh.normals.astype(float) @ np.linalg.inv(linear) * abs(np.linalg.det(linear)) ** (1.0 / 3.0)
-    return star_shape(vertices, mesh.faces, normals, f"object '{reflector.source.called}'")
+    try:
+        return star_shape(vertices, mesh.faces, normals, f"object '{reflector.source.called}'")
+    except NotForThisScene as refusal:
+        raise NotForThisScene(f"{refusal}; ldt or bvh take any mirror, bisector any smooth one") from None

@@ -61,7 +61,7 @@ def reflections(
 ) -> np.ndarray:
     """(n,) ``Reflection`` of points in an ellipsoid about the origin."""
     limits = SearchLimits()
-    limits.most_iterations, limits.least_area, limits.most_residual = most_iterations, 1e-18, 1e-5
+    limits.most_iterations, limits.least_area, limits.most_residual = most_iterations, 1e-14, 1e-5
     limits.least_solid_angle = least_solid_angle
     surface = Ellipsoid()
     surface.axes, surface.highest = wp.vec3d(*axes), highest
@@ -101,3 +101,8 @@ def heights_between(eyes: np.ndarray, points: np.ndarray) -> np.ndarray:
     way = points - eyes
     share = np.clip(-np.einsum("ij,ij->i", eyes, way) / np.einsum("ij,ij->i", way, way), 0.0, 1.0)
     return np.linalg.norm(eyes + share[:, None] * way, axis=1) - 1.0
+
+
+def dots(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """(n,) scalar products."""
+    return np.einsum("ij,ij->i", a, b)

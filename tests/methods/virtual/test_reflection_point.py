@@ -129,6 +129,22 @@ def test_a_mesh_of_an_ellipsoid_is_an_ellipsoid() -> None:
     assert both.sum() > 1000 and np.percentile(errors, 99) < 1e-3
 
 
+def test_beyond_the_rim_of_an_open_mesh_nothing_is_mirrored() -> None:
+    # The lower half of a sphere, seen from below.
+    bowl = make("bowl", {"closed": False, "depth": 1.0, "segments": [256, 128]})
+    radius, top = bowl.bounds[1, 0], bowl.bounds[1, 2]
+    sphere = Sphere(centre=(0.0, 0.0, top), radius=radius)
+    eyes, points = (np.array([0.0, 0.0, top]) + 4.0 * directions(4000) for _ in range(2))
+    is_below = (eyes[:, 2] < top - 1.0) & (points[:, 2] < top + 3.0)
+    exact, seen = (reflection_point(eyes[is_below], points[is_below], mirror) for mirror in (sphere, bowl))
+    is_in_bowl = exact.points[:, 2] < top - 0.02
+    is_off = exact.points[:, 2] > top + 0.02
+    assert (exact.converged & is_off).sum() > 50 and not seen.converged[exact.converged & is_off].any()
+    assert np.mean(seen.converged[exact.converged & is_in_bowl]) > 0.99
+    errors = np.linalg.norm(seen.points - exact.points, axis=1)[exact.converged & is_in_bowl & seen.converged]
+    assert np.percentile(errors, 99) < 2e-3
+
+
 def test_shapes_are_those_of_the_points() -> None:
     seen = reflection_point((0.0, 0.0, 3.0), np.ones((2, 5, 3)) * 2.0, UNIT)
     assert seen.points.shape == (2, 5, 3) and seen.points.dtype == float
