@@ -19,7 +19,8 @@ silent.
 Fails, as the paper says:
 
 - Between vertices all is interpolated linearly: the reflection of a long triangle has straight edges where it should
-  have curved ones, and neighbours of different fineness show gaps (4.5, Fig. 12). Tessellate the scene finely.
+  have curved ones, and neighbours of different fineness show gaps (4.5, Fig. 12). Tessellate the scene finely, or have
+  its triangles taken to pieces (``levels``), as ``tessellation`` does it.
 - A thin layer on something larger may vanish in it here and there, as depths are interpolated, too (4.5, Fig. 13).
 - In a concave reflector a point may be mirrored several times: one is shown. Triangles that cross the zone in which
   they are many, or that turn upside down, are torn (4.4, Fig. 11).
@@ -31,27 +32,24 @@ Fails, as the paper says:
 
 from __future__ import annotations
 
-import dataclasses
 from typing import Annotated
 
 import numpy as np
-import warp as wp
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from ldtrefl.base import budget
-from ldtrefl.device import launch
 from ldtrefl.device.stats import Stats
 from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.history import Reusable
 from ldtrefl.frame.reflected_light import ReflectedLight
 from ldtrefl.methods.base import CONFIG, CommonConfig, RayMethod
-from ldtrefl.methods.virtual.fermat_search import SearchLimits, fermat_search
+from ldtrefl.methods.virtual.fermat_places import FermatPlaces
+from ldtrefl.methods.virtual.fermat_search import SearchLimits
 from ldtrefl.methods.virtual.image import VirtualImage
-from ldtrefl.methods.virtual.radius_map import RadiusMap, radial_point
-from ldtrefl.methods.virtual.silhouette import silhouette_point
+from ldtrefl.methods.virtual.radius_map import RadiusMap
 from ldtrefl.methods.virtual.star_shape import star_shape_of
-from ldtrefl.methods.virtual.vertex import HIDDEN, VirtualVertex, not_seen, unfolded
+from ldtrefl.methods.virtual.subdivision import Subdivider, Subdivision
 from ldtrefl.tracing.nothing import shadow_tracer
 from ldtrefl.tracing.ray_buffers import RayBuffer
 from ldtrefl.tracing.tracer import SceneTracer
@@ -64,56 +62,6 @@ NODE_BYTES = 16
 MOST_RESIDUAL = 0.02
 """Radians between the mirrored view and the way to the vertex up to which a vertex counts as found. A search that ends
 by its area is within a small part of that; one that has found nothing is far from it."""
-
-search = fermat_search(RadiusMap, radial_point)
-
-
-@launch.kernel
-def find_vertices(
-    first: int,
-    # In:
-    camera: CameraView,
-    surface: RadiusMap,
-    limits: SearchLimits,
-    points: wp.array(dtype=wp.vec3d),
-    # Out:
-    vertices_out: wp.array(dtype=VirtualVertex),
-    iterations_out: wp.array(dtype=wp.int32),
-):
-    """Search for the reflection of one point."""
-    i = first + wp.tid()
-    eye, vertex = camera.eye - surface.centre, points[i]
-    found = search(surface, eye, vertex - surface.centre, limits)
-    made = not_seen()
-    point = found.point
-    if found.is_hidden != 0:
-        point = silhouette_point(surface, eye, found.point)
-    if found.is_found + found.is_hidden != 0:
-        made = unfolded(camera.eye, surface.centre + point, vertex, wp.dot(point - eye, camera.forward))
-        if found.is_hidden != 0 and made.is_seen != 0:
-            made.is_seen = HIDDEN
-    vertices_out[i] = made
-    iterations_out[i] = found.iterations
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class FermatPlaces:
-    """Places vertices where one reflector shows them."""
-
-    camera: CameraView
-    surface: RadiusMap
-    limits: SearchLimits
-    stats: Stats
-
-    def __call__(self, points: wp.array, vertices: wp.array) -> None:
-        """Fill in the virtual vertices of (n,) vec3d points."""
-        count, device = points.shape[0], points.device
-        iterations = wp.zeros(count, dtype=wp.int32, device=device)
-        inputs = [self.camera, self.surface, self.limits, points, vertices, iterations]
-        launch.launch(find_vertices, count, inputs, device)
-        self.stats.count("vertices", count)
-        self.stats.count("vertices_found", int((vertices.numpy()["is_seen"] != 0).sum()))
-        self.stats.count("iterations", int(iterations.numpy().sum()))
 
 
 class Fermat(RayMethod):
@@ -131,6 +79,12 @@ class Fermat(RayMethod):
         """The most samples of the reflector that the search for a vertex takes after its first three, 1 to 1000."""
         area: Annotated[float, Field(strict=True, ge=0.0, le=100.0)] = 0.01
         """Area in pixels of the image that the triangle of samples covers when a search ends, 0 to 100."""
+        levels: Annotated[int, Field(strict=True, ge=0, le=8)] = 0
+        """Rounds in which triangles are divided where the mirror bends them, 0 to 8."""
+        threshold: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0005
+        """The error of an edge, 0 to 1, from which it is divided."""
+        crack_free: Annotated[bool, Field(strict=True)] = True
+        """Whether edges are divided by their own errors, so that no holes open between triangles."""
 
     config: Config
 
@@ -161,8 +115,7 @@ class Fermat(RayMethod):
                 with stats.stage("radius_map", device):
                     self._maps[reflector] = self._radius_map(reflector)
             with stats.stage("virtual", device):
-                camera = gbuffer.view.camera
-                image.draw(reflector, FermatPlaces(camera, self._maps[reflector], self._limits(camera), stats))
+                self._draw(image, reflector, gbuffer.view.camera, stats)
         with stats.stage("shade", device):
             return image.reflected(shadow_tracer(self.tracer, scene, stats))
 
@@ -172,6 +125,16 @@ class Fermat(RayMethod):
         budget.take(NODE_BYTES * 6 * side * side, f"the map of radii of '{name}'", "resolution")
         shape = star_shape_of(self.scene.objects[reflector], self.scene.device_from_world)
         return shape.radius_map(self.config.resolution, self.scene.device)
+
+    def _draw(self, image: VirtualImage, reflector: int, camera: CameraView, stats: Stats) -> None:
+        """Draw what a reflector shows; triangles are first taken to pieces if there are ``levels``."""
+        config = self.config
+        places = FermatPlaces(camera, self._maps[reflector], self._limits(camera), stats)
+        if config.levels:
+            rule = Subdivision(config.threshold, config.levels, config.crack_free)
+            image.draw_pieces(reflector, Subdivider(self.scene, rule, places, places.errors, stats))
+        else:
+            image.draw(reflector, places)
 
     def _limits(self, camera: CameraView) -> SearchLimits:
         """When searches end."""

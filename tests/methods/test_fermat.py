@@ -82,6 +82,15 @@ def test_long_triangles_have_straight_reflections() -> None:
     assert coarse < fine - 0.05, (coarse, fine)
 
 
+def test_triangles_taken_to_pieces_are_bent() -> None:
+    fine, _ = similarity(scene(BALL))
+    coarse, _ = similarity(scene(BALL, floor=2))
+    pieces, frame = similarity(scene(BALL, floor=2), levels=7)
+    print(f"fermat: SSIM {coarse:.4f} of long triangles, {pieces:.4f} in pieces, {fine:.4f} if finely tessellated")
+    assert pieces > coarse + 0.8 * (fine - coarse)
+    assert frame.stats.counters["pieces"] > 100
+
+
 def test_options_end_searches_sooner() -> None:
     counts = {}
     for name, options in (("usual", {}), ("large area", {"area": 10.0}), ("few", {"iterations": 2})):
