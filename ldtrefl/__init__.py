@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from ldtrefl.files.picture_writing import save_image
     from ldtrefl.ldt.peel import peel
     from ldtrefl.ldt.texture import LayeredDepthTexture
+    from ldtrefl.methods.virtual.reflection_point import Plane, ReflectionPoints, Sphere, reflection_point
     from ldtrefl.renderer import Frame, Renderer, render
     from ldtrefl.scene.description import (
         Camera,
@@ -70,10 +71,13 @@ __all__ = [
     "Object",
     "Occlusion",
     "Picture",
+    "Plane",
     "Raycaster",
     "Reflection",
+    "ReflectionPoints",
     "Renderer",
     "Scene",
+    "Sphere",
     "Stats",
     "keep_maps_in",
     "load_image",
@@ -81,6 +85,7 @@ __all__ = [
     "load_scene",
     "peel",
     "progress_to",
+    "reflection_point",
     "render",
     "save_image",
     "save_layers",
@@ -103,10 +108,13 @@ _HOMES = {
     "Object": "scene.description",
     "Occlusion": "scene.lights",
     "Picture": "scene.picture",
+    "Plane": "methods.virtual.reflection_point",
     "Raycaster": "tracing.bvh",
     "Reflection": "scene.description",
+    "ReflectionPoints": "methods.virtual.reflection_point",
     "Renderer": "renderer",
     "Scene": "scene.description",
+    "Sphere": "methods.virtual.reflection_point",
     "Stats": "device.stats",
     "keep_maps_in": "files.map_cache",
     "load_image": "files.picture_reading",
@@ -114,6 +122,7 @@ _HOMES = {
     "load_scene": "scene.load",
     "peel": "ldt.peel",
     "progress_to": "device.progress",
+    "reflection_point": "methods.virtual.reflection_point",
     "render": "renderer",
     "save_image": "files.picture_writing",
     "save_layers": "files.layer_writing",

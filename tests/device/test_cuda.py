@@ -12,7 +12,14 @@ from ldtrefl.frame.camera_shading import shade_pixels_kernel, shade_reflectors_k
 from ldtrefl.frame.searched_pixels import search_pixels_kernel
 from ldtrefl.frame.seen_surfaces import describe_kernel
 from ldtrefl.ldt.searches import TRACERS
-from ldtrefl.renderer import Renderer  # noqa: F401  (imports every module that defines kernels)
+from ldtrefl.methods import all_methods
+from ldtrefl.methods.virtual import reflection_point  # noqa: F401  (for its kernels)
+from ldtrefl.methods.virtual.bisector_places import texel_towards
+from ldtrefl.methods.virtual.fermat_places import surface_towards
+from ldtrefl.methods.virtual.radius_map import RadiusMap
+from ldtrefl.methods.virtual.reflector_texture import ReflectorTexture
+from ldtrefl.methods.virtual.subdivision import edge_errors_kernel
+from ldtrefl.renderer import Renderer  # noqa: F401  (with the methods, imports every module that defines kernels)
 from ldtrefl.tracing.batch import batch_kernel
 from ldtrefl.tracing.bvh import BVH
 from ldtrefl.tracing.closest_hits import closest_hits_kernel
@@ -40,6 +47,9 @@ that shade call the same functions, so not each of them is built for each of the
 
 
 def all_kernels() -> list[wp.Kernel]:
+    all_methods()
+    edge_errors_kernel(ReflectorTexture, texel_towards)
+    edge_errors_kernel(RadiusMap, surface_towards)
     for tracer in (BVH, *TRACERS.values()):
         batch_kernel(tracer, 1)
         batch_kernel(tracer, 1, True)
