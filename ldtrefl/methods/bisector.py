@@ -43,8 +43,7 @@ from ldtrefl.tracing.ray_buffers import RayBuffer
 
 
 class Bisector(RayMethod):
-    """Vertices mirrored where a search in the image finds normal and bisector alike: quick, for smooth convex mirrors
-    of finely tessellated objects, off by a texel."""
+    """Vertices placed by a search in the image: for fine meshes in smooth convex mirrors, whose maps are never made."""
 
     name = "bisector"
 

@@ -30,7 +30,7 @@ from ldtrefl.tracing.tracer import BoundTracer
 
 
 class Bvh(RayMethod):
-    """Ray casting through a BVH over the triangles: the ground truth."""
+    """Ray casting through a BVH over the triangles: the ground truth, to compare with."""
 
     name = "bvh"
 

@@ -2,5 +2,7 @@
 
     vertex -> VirtualVertex (``vertex.py``) -> drawn at the reflector's pixels (``raster.py``) -> hits (``image.py``)
 
-A method finds the virtual vertices; all else is here. Start with ``image.py``.
+Triangles may be taken to pieces on the way (``subdivision.py``). A method says where vertices are shown; its search is
+here, too, as several share it: in the image (``bisector_places.py``), on a star-shaped reflector (``fermat_places.py``,
+``reflection_point.py``) or in its parameters (``uv_search.py``). Start with ``image.py``.
 """
