@@ -4,7 +4,9 @@ for accurate interactive reflections on curved objects" (2006).
 Each reflector is drawn alone from the eye, its positions and normals kept as textures, in a view that is ``widening``
 times as wide as the image (section 5.2). For each vertex of the other objects the texel is searched for whose normal is
 nearest to the bisector of the ways to the eye and to the vertex (section 4), from the
-middle of the reflector on. There the vertex is mirrored at the tangent
+middle of the reflector on, or, with ``coherent``, from where the search ended in the frame before (section 5.3), which
+is a few texels off while the camera moves little. Where a vertex has several best texels, as on concave reflectors,
+the picture then depends on the frames before. There the vertex is mirrored at the tangent
 plane.
 
 A vertex that is found to lie behind that plane is hidden (region C). It is placed by the inverse search (section 5.1,
@@ -35,11 +37,13 @@ from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.history import Reusable
 from ldtrefl.frame.reflected_light import ReflectedLight
 from ldtrefl.methods.base import CONFIG, CommonConfig, RayMethod
-from ldtrefl.methods.virtual.bisector_places import TextureView, draw_bisected
+from ldtrefl.methods.virtual.bisector_places import Texels, TextureView, draw_bisected
 from ldtrefl.methods.virtual.image import VirtualImage
 from ldtrefl.methods.virtual.subdivision import Subdivision
 from ldtrefl.tracing.nothing import shadow_tracer
 from ldtrefl.tracing.ray_buffers import RayBuffer
+from ldtrefl.tracing.tracer import SceneTracer
+from ldtrefl.world.device_scene import DeviceScene
 
 
 class Bisector(RayMethod):
@@ -55,6 +59,8 @@ class Bisector(RayMethod):
         """How many times as wide as the image the view is in which the reflector is searched, 1 to 8."""
         fineness: Annotated[float, Field(ge=0.25, le=8.0)] = 2.0
         """Texels of that view along a pixel, 0.25 to 8."""
+        coherent: Annotated[bool, Field(strict=True)] = False
+        """Whether searches begin where they ended in the frame before."""
         levels: Annotated[int, Field(strict=True, ge=0, le=8)] = 0
         """Rounds in which triangles are divided where the mirror bends them, 0 to 8."""
         threshold: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0005
@@ -64,6 +70,10 @@ class Bisector(RayMethod):
 
     config: Config
 
+    def __init__(self, scene: DeviceScene, config: CommonConfig, tracer: SceneTracer) -> None:
+        super().__init__(scene, config, tracer)
+        self._texels: Texels = {}
+
     def reflect_rays(
         self, gbuffer: GBuffer, rays: RayBuffer, reusable: Reusable | None, stats: Stats
     ) -> ReflectedLight:
@@ -71,7 +81,8 @@ class Bisector(RayMethod):
         config, device, image = self.config, self.scene.device, VirtualImage(gbuffer, rays)
         stats.count("rays", rays.pixel.shape[0])
         with stats.stage("virtual", device):
+            texels = self._texels if config.coherent else None
             rule = Subdivision(config.threshold, config.levels, config.crack_free)
-            draw_bisected(image, gbuffer, TextureView(config.widening, config.fineness), rule, stats)
+            draw_bisected(image, gbuffer, TextureView(config.widening, config.fineness), rule, stats, texels)
         with stats.stage("shade", device):
             return image.reflected(shadow_tracer(self.tracer, self.scene, stats))

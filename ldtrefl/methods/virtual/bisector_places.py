@@ -6,7 +6,7 @@ objects" (2006): ``methods/bisector.py`` says how.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import warp as wp
 
@@ -30,14 +30,20 @@ def search_vertices(
     camera: CameraView,
     texture: ReflectorTexture,
     points: wp.array(dtype=wp.vec3d),
+    starts: wp.array(dtype=wp.int32),  # the texel that the search of each begins at; empty: the middle
     # Out:
     vertices_out: wp.array(dtype=VirtualVertex),
+    texel_out: wp.array(dtype=wp.int32),
     steps_out: wp.array(dtype=wp.int32),
 ):
     """Search for where the reflector shows one point."""
     i = first + wp.tid()
-    vertex = points[i]
-    found = search_texel(texture, texture.start, camera.eye, vertex)
+    vertex, start = points[i], int(texture.start)
+    if starts.shape[0] > 0:
+        if texture.object[starts[i]] >= 0:
+            start = starts[i]
+    found = search_texel(texture, start, camera.eye, vertex)
+    texel_out[i] = found.texel
     steps_out[i] = found.steps
     point, normal = texture.position[found.texel], as_double(texture.normal[found.texel])
     height = wp.dot(vertex - point, normal)
@@ -83,12 +89,21 @@ class BisectorPlaces:
     """The image's."""
     texture: ReflectorTexture
     stats: Stats
+    before: wp.array | None = None
+    """(n,) int32: the texels at which searches begin, of calls with as many points."""
+    found: list[wp.array] = field(default_factory=list)
+    """(n,) int32 of each call: the texels that its points were found at."""
 
     def __call__(self, points: wp.array, vertices: wp.array) -> None:
         """Fill in the virtual vertices of (n,) vec3d points."""
         count, device = points.shape[0], points.device
-        steps = wp.zeros(count, dtype=wp.int32, device=device)
-        launch.launch(search_vertices, count, [self.camera, self.texture, points, vertices, steps], device)
+        texels, steps = (wp.zeros(count, dtype=wp.int32, device=device) for _ in range(2))
+        starts = wp.empty(0, dtype=wp.int32, device=device)
+        if self.before is not None and self.before.shape[0] == count:
+            starts = self.before
+        inputs = [self.camera, self.texture, points, starts, vertices, texels, steps]
+        launch.launch(search_vertices, count, inputs, device)
+        self.found.append(texels)
         self.stats.count("vertices", count)
         self.stats.count("steps", int(steps.numpy().sum()))
 
@@ -101,9 +116,27 @@ class BisectorPlaces:
         return errors
 
 
-def draw_bisected(image: VirtualImage, gbuffer: GBuffer, search: TextureView, rule: Subdivision, stats: Stats) -> None:
-    """Search for the vertices of all objects in each reflector that is seen, and draw them there; their triangles are
-    first taken to pieces if ``rule`` has levels.
+Texels = dict[int, tuple[tuple[int, int], wp.array]]
+"""By number of a reflector: height and width of its textures, and the texels that vertices were found at."""
+
+
+def draw_bisected(
+    image: VirtualImage,
+    gbuffer: GBuffer,
+    search: TextureView,
+    rule: Subdivision,
+    stats: Stats,
+    texels: Texels | None = None,
+) -> None:
+    """Search for the vertices of all objects in each reflector that is seen, and draw them there.
+
+    Args:
+        image: where they are drawn.
+        gbuffer: what the camera sees.
+        search: the view in which reflectors are searched.
+        rule: how triangles are first taken to pieces; not at all if it has no levels.
+        stats: counts vertices, steps and pieces.
+        texels: where searches begin, those of the frame before; replaced by where they end. None: in the middle.
 
     Raises:
         InputError: vertices or pieces need more memory than is allowed.
@@ -111,9 +144,14 @@ def draw_bisected(image: VirtualImage, gbuffer: GBuffer, search: TextureView, ru
     scene, view = gbuffer.scene, wider(gbuffer.camera, search.widening, search.fineness)
     for reflector in image.reflectors:
         texture = texture_of(scene, reflector, view)
-        if texture.start >= 0:
-            places = BisectorPlaces(gbuffer.view.camera, texture, stats)
-            if rule.levels:
-                image.draw_pieces(reflector, Subdivider(scene, rule, places, places.errors, stats))
-            else:
-                image.draw(reflector, places)
+        if texture.start < 0:
+            continue
+        size, known = (view.height, view.width), (texels or {}).get(reflector)
+        before = known[1] if known is not None and known[0] == size else None
+        places = BisectorPlaces(gbuffer.view.camera, texture, stats, before)
+        if rule.levels:
+            image.draw_pieces(reflector, Subdivider(scene, rule, places, places.errors, stats))
+        else:
+            image.draw(reflector, places)
+        if texels is not None and places.found:
+            texels[reflector] = size, places.found[0]
