@@ -24,6 +24,7 @@ from tests.frame_scenes import assert_as_fresh, scene
         ("ldt", {"search": "linear"}),
         ("bvh", {}),
         ("envmap", {"resolution": 64}),
+        ("envmap", {"resolution": 64, "projection": "layered"}),
     ],
     ids=str,
 )

@@ -2,6 +2,7 @@
 
 Imports ``frame``, ``ldt`` and what is below them; no method imports another. Start with ``base.py``, the contract.
 Folders hold what several methods share: ``virtual/``, for those that move vertices to where a mirror shows them.
+``cube_maps/`` holds the parts of ``envmap``.
 """
 
 from __future__ import annotations

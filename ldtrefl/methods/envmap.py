@@ -1,89 +1,64 @@
-"""Environment mapping: J. F. Blinn, M. E. Newell, "Texture and Reflection in Computer Generated Images" (1976);
-as a cube map, N. Greene (1986). The baseline that every paper compares with.
+"""Environment mapping: one cube map per reflector, drawn from its centre without it, in which reflected rays are looked
+up. J. F. Blinn, M. E. Newell, "Texture and Reflection in Computer Generated Images" (1976); as a cube map, N. Greene
+(1986). The baseline that every paper compares with, and what was made of it since.
 
-One cube map per reflector, drawn from its centre without it, looked up by the reflected direction alone.
+    ldtrefl render scene.toml --method envmap --set resolution=512 --set projection=layered
 
-    ldtrefl render scene.toml --method envmap --set resolution=512
+``projection`` says what a ray, which starts at x in direction R seen from the map's centre, is looked up by:
 
-Fails: everything is taken to be infinitely far away, so near objects are reflected in the wrong place and size, and
-contact shows a gap.
+- ``infinite``: R alone. Fails: everything is taken to be infinitely far away, so near objects are reflected in the
+  wrong place and size, and contact shows a gap.
+- ``sphere``: where the ray leaves a sphere about the centre (Bjorke 2004, GPU Gems, chapter 19;
+  ``cube_maps/proxies.py``). Its ``radius`` is measured (``cube_maps/surroundings.py``) if it is not given. Exact in a
+  spherical room. Fails: all is taken to be equally far.
+- ``box``: where it leaves a box along the world's axes (Behc 2010; Lagarde and Zanuttini 2012), measured as well. Exact
+  in a room that is a box with nothing in it. Fails: what stands in the room is painted on its walls, and so is the
+  environment where a side is partly open.
+- ``distance``: where a search by secants in a map of distances ends (Szirmay-Kalos, Aszodi, Lazanyi and Premecz 2005;
+  ``cube_maps/impostor.py`` has the equations). Fails: what the centre does not see is nowhere, the search may pass a
+  small object or end on one that the ray passes, and silhouettes are torn. A part of the reflector that is behind what
+  the centre sees is looked up by R alone.
+- ``layered``: the first place that a linear search and then secants find along the ray in two layers of distances, all
+  that the centre sees and what stands behind it (Umenhoffer, Patow and Szirmay-Kalos 2007, GPU Gems 3, chapter 17;
+  ``cube_maps/layers.py``). Fails: what stands behind two surfaces is not there, surfaces that the centre sees edge-on
+  have holes, and what is smaller than some texels may be passed. A search takes as long as tens of look-ups.
+
+All of them: silhouettes and textures are as coarse as the map's texels. A reflector does not show itself, and other
+reflectors show their own colour without what they reflect: no ray is reflected twice. Surfaces are lit as the centre
+sees them: what it sees from behind is shown so to all rays, and so is a highlight. Backs that nobody may see are black.
+A light with a shape is part of the map, in both layers.
 """
 
 from __future__ import annotations
 
-from typing import Annotated
+from dataclasses import dataclass
+from typing import Annotated, Literal
 
 import numpy as np
 import warp as wp
 from pydantic import Field
-from pydantic.dataclasses import dataclass
+from pydantic.dataclasses import dataclass as pydantic_dataclass
 
 from ldtrefl.base import budget
+from ldtrefl.base.errors import InputError
 from ldtrefl.device import launch
 from ldtrefl.device.stats import Stats
 from ldtrefl.frame.bounces import summed_by_pixel
-from ldtrefl.frame.camera_shading import shade_gbuffer
 from ldtrefl.frame.gbuffer import GBuffer
 from ldtrefl.frame.history import Reusable
 from ldtrefl.frame.reflected_light import ReflectedLight
-from ldtrefl.frame.visibility import draw_in_bands
-from ldtrefl.geometry.bilinear import bilinear_blend, neighbours_clamped
 from ldtrefl.methods.base import CONFIG, CommonConfig, RayMethod
-from ldtrefl.scene.description import Camera
+from ldtrefl.methods.cube_maps.drawing import Drawn, draw_layers
+from ldtrefl.methods.cube_maps.faces import CubeLayer, look_up
+from ldtrefl.methods.cube_maps.impostor import reflect_distances
+from ldtrefl.methods.cube_maps.layers import reflect_layers
+from ldtrefl.methods.cube_maps.proxies import reflect_box, reflect_sphere
+from ldtrefl.methods.cube_maps.surroundings import Surroundings, reach_of
 from ldtrefl.tracing.nothing import shadow_tracer
 from ldtrefl.tracing.ray_buffers import RayBuffer
 from ldtrefl.tracing.tracer import SceneTracer
 from ldtrefl.world.device_object import DeviceObject
 from ldtrefl.world.device_scene import DeviceScene
-
-PIXEL_BYTES = 12
-"""Bytes of a pixel of a cube map."""
-
-LEAST_DEPTH = wp.constant(0.5)
-"""The least component that a direction is taken to have along the axis of its face. A unit vector has 0.577 or more;
-the direction to what the eye touches is 0."""
-
-LEAST_SIZE = 1e-6
-"""A cube map's camera looks at a point at least this far from the reflector's centre, as a share of the centre's
-largest coordinate: a nearer point would be rounded to the centre."""
-
-
-@wp.func
-def cube_face(direction: wp.vec3) -> int:
-    """The face 0..5 = +x, -x, +y, -y, +z, -z that a direction points to."""
-    axis = int(0)
-    if wp.abs(direction[1]) > wp.abs(direction[axis]):
-        axis = 1
-    if wp.abs(direction[2]) > wp.abs(direction[axis]):
-        axis = 2
-    if direction[axis] < 0.0:
-        return 2 * axis + 1
-    return 2 * axis
-
-
-@wp.func
-def look_up(cube: wp.array(dtype=wp.vec3), resolution: int, direction: wp.vec3) -> wp.vec3:
-    """Bilinear radiance of a cube map in a unit direction; samples beyond a face's edge are its border's."""
-    face = cube_face(direction)
-    # The face's camera: forward along its axis, up +z, or +y for the faces of z.
-    forward = wp.vec3(0.0)
-    forward[face / 2] = wp.where(face % 2 == 0, 1.0, -1.0)
-    up = wp.where(face >= 4, wp.vec3(0.0, 1.0, 0.0), wp.vec3(0.0, 0.0, 1.0))
-    right = wp.cross(forward, up)
-    depth = wp.max(wp.dot(direction, forward), LEAST_DEPTH)
-    x = 0.5 * float(resolution) * (wp.dot(direction, right) / depth + 1.0) - 0.5
-    y = 0.5 * float(resolution) * (1.0 - wp.dot(direction, up) / depth) - 0.5
-    columns, rows = neighbours_clamped(x, resolution), neighbours_clamped(y, resolution)
-    upper = (face * resolution + rows.before) * resolution
-    lower = (face * resolution + rows.after) * resolution
-    return bilinear_blend(
-        columns,
-        rows,
-        cube[upper + columns.before],
-        cube[upper + columns.after],
-        cube[lower + columns.before],
-        cube[lower + columns.after],
-    )
 
 
 @launch.kernel
@@ -103,23 +78,42 @@ def reflect_cube(
         radiance_out[i] = look_up(cube, resolution, rays.direction[i])
 
 
+@dataclass(frozen=True, eq=False)
+class CubeMap:
+    """A reflector's cube map, and how rays are looked up in it."""
+
+    layers: list[CubeLayer]
+    kernel: wp.Kernel
+    inputs: list[object]
+    """What the kernel takes beside the rays, the reflector's number and the radiance."""
+
+
 class EnvironmentMap(RayMethod):
-    """A cube map from each reflector's centre, looked up by direction: the classic baseline."""
+    """A cube map from each reflector's centre, looked up by direction, or by where a ray meets what the map shows."""
 
     name = "envmap"
 
-    @dataclass(frozen=True, kw_only=True, config=CONFIG)
+    @pydantic_dataclass(frozen=True, kw_only=True, config=CONFIG)
     class Config(CommonConfig):
         """Options of ``envmap``."""
 
         resolution: Annotated[int, Field(strict=True, ge=1, le=4096)] = 512
         """Pixels along a side of each face, 1 to 4096."""
+        projection: Literal["infinite", "sphere", "box", "distance", "layered"] = "infinite"
+        """What a ray is looked up by: infinite (its direction), sphere or box (where it leaves one that stands for all
+        around), distance (a search in a map of distances), layered (in two of them, one behind the other)."""
+        radius: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] | None = None
+        """Of the sphere about a reflector's centre, in the world's units; measured from the cube map if not given."""
+
+        def __post_init__(self) -> None:
+            if self.radius is not None and self.projection != "sphere":
+                raise InputError(f"radius: only projection=sphere has one, got projection={self.projection}")
 
     config: Config
 
     def __init__(self, scene: DeviceScene, config: CommonConfig, tracer: SceneTracer) -> None:
         super().__init__(scene, config, tracer)
-        self._cubes: dict[int, wp.array] = {}
+        self._cubes: dict[int, CubeMap] = {}
         """The cube maps, by number of the reflector."""
         self._up: tuple[float, ...] = ()
         """The direction of the environment's top when they were drawn."""
@@ -134,7 +128,7 @@ class EnvironmentMap(RayMethod):
     def reflect_rays(
         self, gbuffer: GBuffer, rays: RayBuffer, reusable: Reusable | None, stats: Stats
     ) -> ReflectedLight:
-        """Draw the cube maps on first need, then look up the direction of every ray."""
+        """Draw the cube maps on first need, then look up every ray."""
         device, count = self.scene.device, rays.pixel.shape[0]
         radiance = wp.zeros(count, dtype=wp.vec3, device=device)
         stats.count("rays", count)
@@ -149,41 +143,59 @@ class EnvironmentMap(RayMethod):
             if entry.index not in seen:
                 continue
             if entry.index not in self._cubes:
-                self._cubes[entry.index] = self._draw_cube(entry, stats)
+                self._cubes[entry.index] = self._made(entry, stats)
             with stats.stage("shade", device):
-                inputs = [rays, entry.index, self._cubes[entry.index], self.config.resolution, radiance]
-                launch.launch(reflect_cube, count, inputs, device)
+                cube = self._cubes[entry.index]
+                launch.launch(cube.kernel, count, [rays, entry.index, *cube.inputs, radiance], device)
         return ReflectedLight(summed_by_pixel(gbuffer.reflector_pixels, rays, radiance))
+
+    @property
+    def _drawn(self) -> Drawn:
+        """What is drawn of each cube map."""
+        projection = self.config.projection
+        return Drawn(self.config.resolution, 2 if projection == "layered" else 1, projection != "infinite")
 
     def _take_memory(self, cubes: int) -> None:
         """Ask for what so many more cube maps need, once for each reflector."""
         if cubes > self._cubes_taken:
-            side = self.config.resolution
+            side, drawn = self.config.resolution, self._drawn
             what = f"{cubes} cube maps of 6 x {side} x {side} pixels"
-            budget.take(PIXEL_BYTES * 6 * side * side * cubes, what, "resolution")
+            budget.take(drawn.bytes * cubes + drawn.working_bytes, what, "resolution")
             self._cubes_taken = cubes
 
-    def _draw_cube(self, reflector: DeviceObject, stats: Stats) -> wp.array:
-        """(6 * resolution^2,) vec3 radiance about the reflector's centre, face by face, row by row."""
+    def _made(self, reflector: DeviceObject, stats: Stats) -> CubeMap:
+        """The cube map about a reflector's centre."""
         shadow = shadow_tracer(self.tracer, self.scene, stats)
-        eye = reflector.world_from_unit[:3, 3]
-        size = max(reflector.longest_side, LEAST_SIZE * float(np.abs(eye).max()))
-        side = self.config.resolution
-        cube, begin = wp.empty(6 * side * side, dtype=wp.vec3, device=self.scene.device), 0
+        behind = shadow
+        if self._drawn.layers > 1:
+            behind = self.tracer.bound(self.scene, range(len(self.scene.objects)), stats)
         with stats.stage("cubemap", self.scene.device):
-            for face in range(6):
-                forward = np.zeros(3)
-                forward[face // 2] = size if face % 2 == 0 else -size
-                camera = Camera(
-                    eye=tuple(eye.tolist()),
-                    look_at=tuple((eye + forward).tolist()),
-                    up=(0.0, 1.0, 0.0) if face >= 4 else (0.0, 0.0, 1.0),
-                    fov_y=90.0,
-                    width=side,
-                    height=side,
-                )
-                for seen in draw_in_bands(self.scene, camera, without=reflector.index):
-                    band = cube[begin : begin + seen.pixel_count]
-                    shade_gbuffer(seen, shadow, starts_rays=False, radiance=band)
-                    begin += seen.pixel_count
-        return cube
+            layers = draw_layers(self._drawn, self.scene, reflector, shadow, behind, self.skip.bounds)
+            return self._looked_up(layers, reflector)
+
+    def _looked_up(self, layers: list[CubeLayer], reflector: DeviceObject) -> CubeMap:
+        """How rays are looked up in what was drawn."""
+        projection, side, centre = self.config.projection, self.config.resolution, wp.vec3d(*reflector.centre)
+        flat = [layers[0].radiance, side]
+        if projection == "infinite":
+            return CubeMap(layers, reflect_cube, flat)
+        if projection in ("distance", "layered"):
+            reach = max(reach_of(layer.nearness.numpy(), side) for layer in layers)
+            kernel = reflect_distances if projection == "distance" else reflect_layers
+            return CubeMap(layers, kernel, [*layers, side, centre, reach, self.scene.lighting])
+        if projection == "sphere" and self.config.radius is not None:
+            return CubeMap(layers, reflect_sphere, [*flat, centre, self.config.radius * self._scale])
+        around = Surroundings.of(layers[0].nearness.numpy(), side, *self._own_box(reflector))
+        if projection == "sphere":
+            return CubeMap(layers, reflect_sphere, [*flat, centre, around.radius])
+        return CubeMap(layers, reflect_box, [*flat, centre, wp.vec3(*around.low), wp.vec3(*around.high)])
+
+    @property
+    def _scale(self) -> float:
+        return self.scene.device_units_per_world_unit
+
+    def _own_box(self, reflector: DeviceObject) -> tuple[np.ndarray, np.ndarray]:
+        """(3,) corners of the box along the axes about a reflector, relative to its centre, in device units."""
+        mesh = reflector.geometry.mesh
+        points = mesh.unit_vertices[mesh.is_used] @ (self._scale * reflector.world_from_unit[:3, :3].T)
+        return points.min(axis=0), points.max(axis=0)

@@ -47,7 +47,10 @@ OPTIONS: list[tuple[str, dict[str, Any]]] = [
     ("ldt", {"cull": "flat", "resolution": COARSE}),
     *[("ldt", {"skip": [name for name in skip_names() if name != off], "resolution": COARSE}) for off in skip_names()],
     ("bvh", {"max_bounces": 2}),
-    ("envmap", {"resolution": 16}),
+    *[
+        ("envmap", {"resolution": 16, "projection": name})
+        for name in ("infinite", "sphere", "box", "distance", "layered")
+    ],
 ]
 
 SECONDS = 3600

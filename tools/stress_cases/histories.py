@@ -39,6 +39,7 @@ OPTIONS: dict[str, tuple[str, dict[str, Any]]] = {
     "bvh": ("bvh", {}),
     "bvh, two bounces": ("bvh", {"max_bounces": 2}),
     "envmap": ("envmap", {"resolution": 24}),
+    "envmap, layered": ("envmap", {"resolution": 24, "projection": "layered"}),
 }
 """What histories are rendered by."""
 
