@@ -111,6 +111,33 @@ def look_near(nearness: wp.array(dtype=float), resolution: int, direction: wp.ve
 
 
 @wp.func
+def of_surface(near: float, reference: float, resolution: int) -> float:
+    """1 if a texel of this nearness shows the same surface as one of the other, else 0."""
+    return wp.where(wp.abs(near - reference) <= jump_allowed(resolution) * wp.min(near, reference), 1.0, 0.0)
+
+
+@wp.func
+def look_up_surface(layer: CubeLayer, resolution: int, direction: wp.vec3) -> wp.vec3:
+    """Radiance of the surface that the nearest texel's centre shows: bilinear, but for texels that show another."""
+    at = place_in(direction, resolution)
+    upper = (at.face * resolution + at.rows.before) * resolution
+    lower = (at.face * resolution + at.rows.after) * resolution
+    column = wp.where(at.columns.weight < 0.5, at.columns.before, at.columns.after)
+    reference = layer.nearness[wp.where(at.rows.weight < 0.5, upper, lower) + column]
+    total = float(0.0)
+    radiance = wp.vec3(0.0)
+    for k in range(4):
+        row = wp.where(k < 2, upper, lower)
+        weight = wp.where(k < 2, 1.0 - at.rows.weight, at.rows.weight)
+        texel = row + wp.where(k % 2 == 0, at.columns.before, at.columns.after)
+        weight *= wp.where(k % 2 == 0, 1.0 - at.columns.weight, at.columns.weight)
+        weight *= of_surface(layer.nearness[texel], reference, resolution)
+        radiance += weight * layer.radiance[texel]
+        total += weight
+    return radiance / total
+
+
+@wp.func
 def jump_allowed(resolution: int) -> float:
     """The share by which the nearness of one surface may differ from texel to texel."""
     return STEEPEST * 2.0 / float(resolution)

@@ -20,7 +20,7 @@ import warp as wp
 
 from ldtrefl.device import launch
 from ldtrefl.geometry.vectors import from_to
-from ldtrefl.methods.cube_maps.faces import CubeLayer, jump_allowed, look_up
+from ldtrefl.methods.cube_maps.faces import CubeLayer, jump_allowed, look_up_surface
 from ldtrefl.methods.cube_maps.impostor import EXACT, ratio_at
 from ldtrefl.shading.environment import environment_radiance
 from ldtrefl.tracing.ray_buffers import RayBuffer
@@ -97,7 +97,7 @@ def first_meeting(
     end = SAFELY_BEYOND * (reach + length)
     met = Meeting()
     met.d = wp.inf
-    earlier, before, hidden = float(0.0), float(0.0), float(-1.0)
+    before, hidden = float(0.0), float(-1.0)
     front_before = ratio_at(front.nearness, resolution, start)
     back_before = ratio_at(back.nearness, resolution, start)
     for k in range(1, steps + 1):
@@ -114,12 +114,11 @@ def first_meeting(
             met.layer = 1
         if met.d < wp.inf:
             return met
-        # The ray goes on behind the first layer, or comes out from there. A step earlier its texels are of one surface.
+        # The ray goes on behind the first layer, or comes out from there.
         if (front_before < 1.0) != (front_after < 1.0):
-            hidden = wp.where(front_before < 1.0, earlier, -1.0)
+            hidden = wp.where(front_before < 1.0, before, -1.0)
         if after >= end:
             break
-        earlier = before
         before = after
         front_before = front_after
         back_before = back_after
@@ -154,8 +153,8 @@ def reflect_layers(
         if met.d < wp.inf:
             towards = wp.normalize(start + met.d * direction)
             if met.layer == 0:
-                radiance_out[i] = look_up(front.radiance, resolution, towards)
+                radiance_out[i] = look_up_surface(front, resolution, towards)
             else:
-                radiance_out[i] = look_up(back.radiance, resolution, towards)
+                radiance_out[i] = look_up_surface(back, resolution, towards)
         else:
             radiance_out[i] = environment_radiance(lighting, direction)

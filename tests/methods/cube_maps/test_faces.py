@@ -5,7 +5,16 @@ import pytest
 import warp as wp
 
 from ldtrefl.device import launch
-from ldtrefl.methods.cube_maps.faces import cube_face, face_axes, face_camera, look_near, texel_points
+from ldtrefl.methods.cube_maps.faces import (
+    CubeLayer,
+    cube_face,
+    face_axes,
+    face_camera,
+    look_near,
+    look_up,
+    look_up_surface,
+    texel_points,
+)
 from ldtrefl.world.camera import camera_axes
 from tests.methods.cube_maps.rooms import HIGH, LOW, exits_of_box, layer_of, texels, unit
 
@@ -23,6 +32,21 @@ def read_near(
     i = first + wp.tid()
     face_out[i] = cube_face(directions[i])
     near_out[i] = look_near(nearness, resolution, directions[i])
+
+
+@launch.kernel
+def read_radiance(
+    first: int,
+    layer: CubeLayer,
+    resolution: int,
+    directions: wp.array(dtype=wp.vec3),
+    surface_out: wp.array(dtype=wp.vec3),
+    blended_out: wp.array(dtype=wp.vec3),
+):
+    """Read a map's radiance in one direction, in both ways."""
+    i = first + wp.tid()
+    surface_out[i] = look_up_surface(layer, resolution, directions[i])
+    blended_out[i] = look_up(layer.radiance, resolution, directions[i])
 
 
 def read(distance: np.ndarray, resolution: int, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -65,6 +89,22 @@ def test_between_texels_a_plane_is_exact() -> None:
     expected = exits_of_box(np.zeros(3), directions, LOW, HIGH)
     off = np.abs(read(distance, resolution, directions)[1] / expected - 1.0)
     assert np.quantile(off, 0.9) < 1e-6 and off.max() < 2.0 / resolution
+
+
+def test_radiance_is_that_of_one_surface() -> None:
+    """White at 1 about the x axis, black at 3 around it: nothing between is grey, as it is if all is blended."""
+    resolution, device = 64, launch.resolve_device(None)
+    directions, ways = unit(np.random.default_rng(3).normal(size=(4000, 3))), unit(texels(resolution))
+    is_near = np.abs(ways[:, 0]) > 0.85
+    layer = layer_of(np.where(is_near, 1.0, 3.0), np.repeat(is_near[:, None], 3, axis=1).astype(float), resolution)
+    given = wp.array(directions.astype(np.float32), dtype=wp.vec3, device=device)
+    found, blended = (wp.empty(len(directions), dtype=wp.vec3, device=device) for _ in range(2))
+    launch.launch(read_radiance, len(directions), [layer, resolution, given, found, blended], device)
+    is_white = found.numpy()[:, 0] > 0.5
+    np.testing.assert_allclose(found.numpy(), np.repeat(is_white[:, None], 3, axis=1), atol=1e-6)
+    sure = np.abs(np.abs(directions[:, 0]) - 0.85) > 2.0 / resolution
+    np.testing.assert_array_equal(is_white[sure], np.abs(directions[sure, 0]) > 0.85)
+    assert ((blended.numpy()[:, 0] > 0.1) & (blended.numpy()[:, 0] < 0.9)).sum() > 20
 
 
 def test_one_object_before_another_is_not_blended() -> None:

@@ -81,6 +81,21 @@ def test_a_start_behind_what_the_map_shows_is_told() -> None:
     assert np.isinf(searched(np.full(6 * RESOLUTION**2, 0.3), starts, directions)).all()
 
 
+def test_behind_an_edge_is_what_is_seen_beside_it() -> None:
+    """A red plate at x = 0.6 before a blue wall at x = 1: the ray passes the plate and meets the wall behind it."""
+    ways = unit(texels(RESOLUTION))
+    with np.errstate(divide="ignore"):
+        across = np.abs(ways[:, 1:] / ways[:, :1]).max(axis=1)
+        plate, wall = 0.6 / ways[:, 0], 1.0 / ways[:, 0]
+    is_plate, is_wall = (ways[:, 0] > 0) & (across < 0.5), (ways[:, 0] > 0) & (across < 2.0)
+    distance = np.where(is_plate, plate, np.where(is_wall, wall, np.inf))
+    layer = layer_of(distance, np.where(is_plate[:, None], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]), RESOLUTION)
+    starts, directions = np.array([[0.1, 0.2, 0.0], [0.1, 0.4, 0.0]]), np.eye(3)[[0, 0]]
+    inputs = [layer, RESOLUTION, wp.vec3d(*CENTRE), 3.0, LightingRecord()]
+    found = looked_up(reflect_distances, starts, directions, *inputs)
+    np.testing.assert_allclose(found, [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]], atol=1e-6)
+
+
 def test_rays_bring_what_the_map_shows_or_the_environment() -> None:
     """Half a spherical room, whose texels hold where they are; above it the environment."""
     lighting = LightingRecord()
