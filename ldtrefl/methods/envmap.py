@@ -13,7 +13,7 @@ up. J. F. Blinn, M. E. Newell, "Texture and Reflection in Computer Generated Ima
   spherical room. Fails: all is taken to be equally far.
 - ``box``: where it leaves a box along the world's axes (Behc 2010; Lagarde and Zanuttini 2012), measured as well. Exact
   in a room that is a box with nothing in it. Fails: what stands in the room is painted on its walls, and so is the
-  environment where a side is partly open.
+  environment where a side is partly open. Under an open sky sphere and box can be worse than ``infinite``.
 - ``distance``: where a search by secants in a map of distances ends (Szirmay-Kalos, Aszodi, Lazanyi and Premecz 2005;
   ``cube_maps/impostor.py`` has the equations). Fails: what the centre does not see is nowhere, the search may pass a
   small object or end on one that the ray passes, and silhouettes are torn. A part of the reflector that is behind what

@@ -25,6 +25,10 @@ from ldtrefl.world.records import SPHERE, LightingRecord
 RADIANCE_BYTES, NEARNESS_BYTES = 12, 4
 """Bytes of a texel."""
 
+TOUCHING = wp.constant(1.0e-12)
+"""Device units from the eye up to which a surface touches it: float64 rounds places in the device's box by a thousandth
+of that."""
+
 LEAST_SIZE = 1e-6
 """A cube map's camera looks at a point at least this far from the reflector's centre, as a share of the centre's
 largest coordinate: a nearer point would be rounded to the centre."""
@@ -81,7 +85,7 @@ def measure_nearness(
         else:
             distance = rectangle_entry(lighting.shaped[light], eye, direction)
     # What touches the eye has no place: it counts as the environment.
-    nearness_out[i] = wp.where(distance > 0.0, stretch / distance, 0.0)
+    nearness_out[i] = wp.where(distance > TOUCHING, stretch / distance, 0.0)
 
 
 def draw_layers(

@@ -88,6 +88,13 @@ def test_a_light_with_a_shape_is_where_it_stands(kind: str) -> None:
     assert (distances(layer, scene)[is_light] < 2.2).all() and (distances(layer, scene)[~is_light] > 3.0).all()
 
 
+def test_what_touches_the_eye_has_no_place() -> None:
+    """A plate through the centre: along it nothing is near, and no texel is nearer than float32 can say."""
+    plate = glowing("plane", (1, 0, 0), translate=tuple(CENTRE))
+    for layer in drawn(on_device(scene_of(plate)), Drawn(RESOLUTION, 2, True)):
+        assert np.isfinite(layer.nearness.numpy()).all() and np.isfinite(layer.radiance.numpy()).all()
+
+
 def test_what_nothing_reads_is_not_kept() -> None:
     scene = on_device(scene_of(glowing("box", (0, 1, 0))))
     (layer,) = drawn(scene, Drawn(RESOLUTION, 1, False))
