@@ -89,7 +89,7 @@ class CubeMap:
 
 
 class EnvironmentMap(RayMethod):
-    """A cube map from each reflector's centre, looked up by direction, or by where a ray meets what the map shows."""
+    """A cube map from each reflector's centre: the classic baseline, for far surroundings; near ones by projection."""
 
     name = "envmap"
 
