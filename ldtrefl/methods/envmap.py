@@ -24,9 +24,10 @@ up. J. F. Blinn, M. E. Newell, "Texture and Reflection in Computer Generated Ima
   have holes, and what is smaller than some texels may be passed. A search takes as long as tens of look-ups.
 
 All of them: silhouettes and textures are as coarse as the map's texels. A reflector does not show itself, and other
-reflectors show their own colour without what they reflect: no ray is reflected twice. Surfaces are lit as the centre
-sees them: what it sees from behind is shown so to all rays, and so is a highlight. Backs that nobody may see are black.
-A light with a shape is part of the map, in both layers.
+reflectors show the environment alone: no ray is reflected twice. Surfaces are lit as the centre sees them: what it sees
+from behind is shown so to all rays, and so are highlights and what a mirror shows. Where backs are not there, or alpha
+cuts a surface out, the environment is seen, whatever stands behind. A light with a shape is part of the map, in both
+layers.
 """
 
 from __future__ import annotations

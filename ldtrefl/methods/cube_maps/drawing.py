@@ -1,4 +1,7 @@
-"""Cube maps are drawn from a reflector's centre, the reflector left out: one layer, or also what stands behind it."""
+"""Cube maps are drawn from a reflector's centre, the reflector left out: one layer, or also what stands behind it.
+
+Other mirrors reflect the environment alone in them, as mirrors do where a ray's bounces are used up.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +19,9 @@ from ldtrefl.geometry.sphere import sphere_entry
 from ldtrefl.geometry.vectors import as_single
 from ldtrefl.methods.cube_maps.faces import CubeLayer, face_camera
 from ldtrefl.methods.cube_maps.peeling import PEELING_BYTES, seen_behind
+from ldtrefl.shading.environment import environment_radiance
 from ldtrefl.shading.light_shapes import rectangle_entry, seen_light
+from ldtrefl.tracing.ray_buffers import RayBuffer
 from ldtrefl.tracing.tracer import BoundTracer
 from ldtrefl.world.device_object import DeviceObject
 from ldtrefl.world.device_scene import DeviceScene
@@ -29,9 +34,29 @@ TOUCHING = wp.constant(1.0e-12)
 """Device units from the eye up to which a surface touches it: float64 rounds places in the device's box by a thousandth
 of that."""
 
+RAY_BYTES = 80
+"""Bytes of the ray of a texel that shows a mirror, and of what that reflects."""
+
 LEAST_SIZE = 1e-6
 """A cube map's camera looks at a point at least this far from the reflector's centre, as a share of the centre's
 largest coordinate: a nearer point would be rounded to the centre."""
+
+
+@launch.kernel
+def reflect_environment(
+    first: int,
+    # In:
+    pixels: wp.array(dtype=wp.int32),
+    mirror: wp.array(dtype=wp.vec3),
+    rays: RayBuffer,
+    lighting: LightingRecord,
+    # In and out:
+    radiance: wp.array(dtype=wp.vec3),
+):
+    """Let the mirror that one pixel sees reflect the environment."""
+    i = first + wp.tid()
+    reflected = wp.cw_mul(mirror[i], environment_radiance(lighting, rays.direction[i]))
+    radiance[pixels[i]] = radiance[pixels[i]] + reflected
 
 
 @dataclass(frozen=True)
@@ -58,7 +83,7 @@ class Drawn:
     @property
     def working_bytes(self) -> int:
         """Bytes beside it while it is drawn."""
-        return min(self.resolution**2, BAND_PIXELS) * PEELING_BYTES if self.has_nearness else 0
+        return min(self.resolution**2, BAND_PIXELS) * (RAY_BYTES + (PEELING_BYTES if self.has_nearness else 0))
 
 
 @launch.kernel
@@ -129,7 +154,10 @@ def _faces(drawn: Drawn, scene: DeviceScene, reflector: DeviceObject) -> Iterato
 def _store(gbuffer: GBuffer, shadow: BoundTracer, layer: CubeLayer, begin: int) -> None:
     """Store what a band sees in a layer, from texel ``begin`` on."""
     end, scene = begin + gbuffer.pixel_count, gbuffer.scene
-    shade_gbuffer(gbuffer, shadow, starts_rays=False, radiance=layer.radiance[begin:end])
+    radiance, pixels = layer.radiance[begin:end], gbuffer.reflector_pixels
+    shaded = shade_gbuffer(gbuffer, shadow, starts_rays=True, radiance=radiance)
+    inputs = [pixels, shaded.mirror, shaded.rays, scene.lighting, radiance]
+    launch.launch(reflect_environment, pixels.shape[0], inputs, scene.device)
     if layer.nearness.shape[0] > 0:
         inputs = [gbuffer.view, gbuffer.surfaces[0], scene.lighting, layer.nearness[begin:end]]
         launch.launch(measure_nearness, gbuffer.pixel_count, inputs, scene.device)

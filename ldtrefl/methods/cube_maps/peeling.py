@@ -15,6 +15,7 @@ from ldtrefl.device import launch
 from ldtrefl.device.stats import Stats
 from ldtrefl.frame.gbuffer import GBuffer, GBufferView, ray_through
 from ldtrefl.frame.regions import FEW_OBJECTS, safe_regions
+from ldtrefl.frame.sample_points import find_mirrors
 from ldtrefl.geometry.vectors import as_single
 from ldtrefl.tracing.closest_hits import closest_hits_kernel
 from ldtrefl.tracing.object_sets import ObjectSets, run_count
@@ -66,6 +67,7 @@ def seen_behind(gbuffer: GBuffer, tracer: BoundTracer, without: int, *, by_bound
     view.object, view.triangle = hits.object, hits.triangle
     view.reflector = wp.zeros(count, dtype=wp.uint8, device=device)
     view.camera, view.place = gbuffer.view.camera, gbuffer.view.place
+    launch.launch(find_mirrors, count, [scene.records, scene.looks, view], device)
     return dataclasses.replace(gbuffer, view=view)
 
 

@@ -1,5 +1,7 @@
 """Cube maps as they are drawn: what each layer shows, and how near it is."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 import warp as wp
@@ -95,6 +97,26 @@ def test_what_touches_the_eye_has_no_place() -> None:
         assert np.isfinite(layer.nearness.numpy()).all() and np.isfinite(layer.radiance.numpy()).all()
 
 
+def test_mirrors_reflect_the_environment() -> None:
+    """A mirror lies on the ground, and another stands behind a plate: seen in them, up is down."""
+    half = Material(albedo=0.0, mirror=0.5)
+    floor = Object(shape="plane", scale=3.0, translate=(0.0, 0.0, -1.0), material=half)
+    black = Object(shape="plane", scale=6.0, translate=(0.0, 0.0, 2.0), material=Material(albedo=0.0))
+    above = Object(shape="plane", scale=30.0, translate=(0.0, 0.0, 3.0), material=half)
+    given = dataclasses.replace(scene_of(floor, black, above), environment=Environment(sky=(0, 0, 1), ground=(1, 0, 0)))
+    front, back = drawn(on_device(given), Drawn(RESOLUTION, 2, True))
+    ways = unit(texels(RESOLUTION))
+    at_height = {z: CENTRE + ways * ((z - CENTRE[2]) / ways[:, 2])[:, None] for z in (-1.0, 2.0)}
+    on_floor = (ways[:, 2] < 0) & (np.abs(at_height[-1.0][:, :2]).max(axis=1) < 2.9)
+    behind = (ways[:, 2] > 0) & (np.abs(at_height[2.0][:, :2]).max(axis=1) < 5.8)
+    blend = 0.5 - 0.5 * ways[:, 2:]
+    expected = 0.5 * (blend * [0, 0, 1] + (1 - blend) * [1, 0, 0])
+    assert on_floor.sum() > 500 and behind.sum() > 500
+    np.testing.assert_allclose(front.radiance.numpy()[on_floor], expected[on_floor], atol=1e-5)
+    np.testing.assert_allclose(back.radiance.numpy()[behind], expected[behind], atol=1e-5)
+    assert not front.radiance.numpy()[behind].any()
+
+
 def test_what_nothing_reads_is_not_kept() -> None:
     scene = on_device(scene_of(glowing("box", (0, 1, 0))))
     (layer,) = drawn(scene, Drawn(RESOLUTION, 1, False))
@@ -102,4 +124,4 @@ def test_what_nothing_reads_is_not_kept() -> None:
     assert isinstance(layer.radiance, wp.array)
     assert Drawn(RESOLUTION, 1, False).bytes == 12 * 6 * RESOLUTION**2
     assert Drawn(RESOLUTION, 2, True).bytes == 32 * 6 * RESOLUTION**2
-    assert Drawn(RESOLUTION, 1, False).working_bytes == 0 < Drawn(RESOLUTION, 2, True).working_bytes
+    assert 0 < Drawn(RESOLUTION, 1, False).working_bytes < Drawn(RESOLUTION, 2, True).working_bytes

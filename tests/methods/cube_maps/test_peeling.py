@@ -53,7 +53,7 @@ def test_what_stands_behind_is_the_next_surface(face: int, more: int, by_bounds:
     if more == 0:
         expected = np.where(is_plate, 2.0 / unit(points)[:, 2], 3.0) if face == 4 else np.full(len(points), 3.0)
         np.testing.assert_allclose(distance, expected, rtol=5e-3)
-    assert not behind.view.reflector.numpy().any()
+    assert not behind.view.reflector.numpy().any(), "none of these is a mirror"
 
 
 def test_behind_the_environment_is_nothing() -> None:
