@@ -1,0 +1,1 @@
+"""What the page that compares all methods is made of."""
