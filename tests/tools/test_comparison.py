@@ -56,7 +56,7 @@ def written(*outcomes: SceneOutcome) -> str:
 @pytest.mark.parametrize("entry", entries(), ids=lambda entry: entry.label)
 def test_every_method_says_when_to_choose_it_and_what_it_fails_at(entry: Entry) -> None:
     assert len(entry.purpose) > 20
-    assert "Fails" in entry.failings and len(entry.failings) > 20
+    assert "Fails" in entry.failings[0] and len(entry.failings[0]) > 20
     assert set(entry.options) <= set(entry.method.options())
 
 
@@ -76,11 +76,11 @@ def test_methods_that_are_asked_for_bounces_know_more_than_one_reflection() -> N
 
 def test_failings_are_the_rest_of_the_file_or_the_item_of_the_options_value() -> None:
     rest = "A method.\n\nIt fails never.\n\nFails, as said:\n\n- here;\n- there.\n\nAlso there."
-    assert failings_in(rest) == failings_in(rest, "near") == "Fails, as said:\n\n- here;\n- there.\n\nAlso there."
+    assert failings_in(rest) == failings_in(rest, "near") == ("Fails, as said:\n\n- here;\n- there.\n\nAlso there.", "")
     items = "A method.\n\n- ``near``: close. Fails: far\n  away.\n- ``far``: Fails: close by.\n\nBoth: coarse.\n\nMore."
-    assert failings_in(items, "near") == "``near``: close. Fails: far\n  away.\n\nBoth: coarse."
-    assert failings_in(items, "far") == "``far``: Fails: close by.\n\nBoth: coarse."
-    assert failings_in("A method.") == ""
+    assert failings_in(items, "near") == ("``near``: close. Fails: far\n  away.", "Both: coarse.")
+    assert failings_in(items, "far") == ("``far``: Fails: close by.", "Both: coarse.")
+    assert failings_in("A method.") == ("", "")
 
 
 def test_words_become_html() -> None:

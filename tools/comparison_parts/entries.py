@@ -49,8 +49,8 @@ class Entry:
         return self.method.describe()
 
     @property
-    def failings(self) -> str:
-        """What it fails at by design, as its file says."""
+    def failings(self) -> tuple[str, str]:
+        """What it fails at by design, as its file says; and what is said there of all values of the option."""
         value = self.value
         if value is None and self.method.name in SHOWN_APART:
             value = _default(self.method, SHOWN_APART[self.method.name])
@@ -90,15 +90,15 @@ def _default(method: type[Method], option: str) -> object:
     return method.options().get(option, (None, ""))[0]
 
 
-def failings_in(words: str, value: object = None) -> str:
+def failings_in(words: str, value: object = None) -> tuple[str, str]:
     """What a method's file says of how it fails: from the line on that begins with "Fails".
 
-    Where each value of an option fails in its own way, in a list, it is the item that begins with this value, and the
-    paragraph after the list.
+    Where each value of an option fails in its own way, in a list, it is the item that begins with this value; and
+    besides, as the second text, the paragraph after the list.
     """
     item = re.search(rf"^- ``{re.escape(str(value))}``:.*?(?=^- |\n\n|\Z)", words, re.MULTILINE | re.DOTALL)
     if item and "Fails:" in item[0]:
         after = re.search(r"\n\n(?!- )(.+?)(?=\n\n|\Z)", words[item.end() - 1 :], re.DOTALL)
-        return "\n\n".join([item[0].removeprefix("- ").strip(), *([after[1].strip()] if after else [])])
+        return item[0].removeprefix("- ").strip(), after[1].strip() if after else ""
     rest = re.search(r"^Fails\b.*", words, re.MULTILINE | re.DOTALL)
-    return rest[0].strip() if rest else ""
+    return (rest[0].strip() if rest else ""), ""

@@ -138,12 +138,13 @@ def _overall_table(rows: Sequence[Overall], scenes: int) -> str:
 
 
 def _failings(entries: Sequence[Entry]) -> str:
-    """A part for each method; for each way that it works, if its file says of each how it fails."""
-    by_words: dict[tuple[str, str], list[str]] = {}
+    """What methods' files say: once of methods of which the same is said."""
+    labels: dict[tuple[str, str], list[str]] = {}
     for entry in entries:
-        by_words.setdefault((entry.method.name, entry.failings), []).append(_code(entry.label))
+        for words in filter(None, entry.failings):
+            labels.setdefault((entry.method.name, words), []).append(_code(entry.label))
     parts = [
-        f"<article><h3>{', '.join(labels)}</h3>{paragraphs(words)}</article>" for (_, words), labels in by_words.items()
+        f"<article><h3>{', '.join(those)}</h3>{paragraphs(words)}</article>" for (_, words), those in labels.items()
     ]
     return f'<div class="methods">{"".join(parts)}</div>'
 
@@ -156,7 +157,7 @@ def _scene(outcome: SceneOutcome) -> str:
     cards = "".join(_card(label, found, outcome) for label, found in outcome.by_label.items())
     height, width = truth.shape[:2]
     note = f"Green: the fastest in later frames of those with SSIM {GOOD:g} or more. Wrong hits: reflected rays that "
-    note += "should have ended elsewhere, in percent of those that end on something."
+    note += "end on another object than they should, or wrongly on none or on one, in percent of all."
     return (
         f'<section><h2 id="{_anchor(outcome.name)}">{html.escape(outcome.name)}</h2>'
         f'<p class="quiet">{html.escape(outcome.about)}</p>'
