@@ -20,11 +20,11 @@ OVERALL_COLUMNS = (
     "scenes",
     "SSIM, median",
     "worst",
-    "SSIM to one reflection, median",
+    "to one reflection, median",
     "worst",
     f"first frame / {TRUTH}",
     f"later frame / {TRUTH}",
-    "memory at most, MB",
+    "memory, MB",
     "worst in",
 )
 
