@@ -45,7 +45,7 @@ def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scenes", type=names, help="with commas between; default: all")
     parser.add_argument("--methods", type=names, default=[], help="with commas between; default: all")
-    parser.add_argument("--size", default="384x256", help="WxH, into which each picture is fitted; default: 384x256")
+    parser.add_argument("--size", default="288x192", help="WxH, into which each picture is fitted; default: 288x192")
     parser.add_argument("-o", "--output", type=Path, help="folder to write to; default of a full run: " + str(RESULTS))
     given = parser.parse_args()
     if given.output is None:

@@ -130,6 +130,13 @@ def test_a_scene_by_three_methods() -> None:
     assert planar.figures is None and "flat mirrors" in planar.refusal
 
 
+def test_slow_methods_make_one_frame_that_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = fitted(ldtrefl.load_scene(SCENES / "wall.toml"), (24, 16))
+    monkeypatch.setattr("comparison_parts.measuring.SLOW", 0.0)
+    figures = compared("wall", scene, entries(["bvh"])).by_label[TRUTH].figures
+    assert figures is not None and figures.later == figures.first > 0.0
+
+
 def test_scenes_are_those_of_two_folders() -> None:
     assert {"teapot", "paper/kettle"} <= set(scene_names())
     assert not any(name.startswith(("gallery", "meshes")) for name in scene_names())

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from .entries import TRUTH, Entry
-from .measuring import Figures, Outcome, SceneOutcome
+from .measuring import SLOW, Figures, Outcome, SceneOutcome
 from .pictures import GAIN, difference_uri, picture_uri
 from .summary import EXACT, GOOD, Overall, fastest, overall, wins
 from .words import escaped, megabytes, milliseconds, number, paragraphs, ratio
@@ -86,7 +86,8 @@ def _introduction(outcomes: Sequence[SceneOutcome], circumstances: Circumstances
         "one reflection only are held, besides, against a truth with one.</p>"
         f'<p class="quiet">Pictures within {width} x {height} pixels, one sample each. First frame: from a scene in '
         "memory to its picture, with all that is built for it. Later frame: the median of three more, the camera "
-        "moved a little before each, all methods in turn. Memory: what the process grows by in a first frame. "
+        "moved a little before each, all methods in turn; of methods whose first frame took more than "
+        f"{SLOW / 1000:g} s, the first. Memory: what the process grows by in a first frame. "
         f"{html.escape(circumstances.machine)}; {circumstances.threads} threads.{missing}</p>"
     )
 
