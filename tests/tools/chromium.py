@@ -121,8 +121,8 @@ def new_page(program: str, profile: Path) -> Iterator[Page]:
     command = [program, *options, f"--user-data-dir={profile}"]
     # Chromium reads from 3 and writes to 4.
     script = f'exec "$@" 3<&{theirs[0]} 4>&{theirs[1]}'
-    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    process = subprocess.Popen(["bash", "-c", script, "bash", *command], pass_fds=theirs, **quiet)
+    whole, quiet = ["bash", "-c", script, "bash", *command], subprocess.DEVNULL
+    process = subprocess.Popen(whole, pass_fds=theirs, stdout=quiet, stderr=quiet)
     for end in theirs:
         os.close(end)
     try:

@@ -23,15 +23,15 @@ from .entries import TRUTH, Entry
 
 ROUNDS = 3
 """Of later frames, all methods in turn."""
-MOST_SECONDS = 8.0
+MOST_SECONDS = 4.0
 """In which a round of a scene's later frames may begin."""
 
-SLOW = 4000.0
+SLOW = 2000.0
 """Milliseconds: a method whose first frame took longer makes no other, which is said to take as long."""
 
 SMALLER = 4
 """Pixels of a frame along one of the small frame that is made first."""
-QUICK = 2.0
+QUICK = 0.5
 """Seconds: after a small frame that took no longer, a frame of full size is made that does not count."""
 
 

@@ -194,7 +194,7 @@ def _card(label: str, found: Outcome, outcome: SceneOutcome) -> str:
     height, width = truth.shape[:2]
     size = f'width="{width}" height="{height}" style="height: auto"'
     name = html.escape(label)
-    head = f"<article><h3>{_code(label)}{'' if label != TRUTH else ', the truth'}</h3>"
+    head = f"<article><h3>{_code(label)}{'' if label != TRUTH else 'the truth'}</h3>"
     words = f"{html.escape(outcome.name)} by {name}"
     head += f'<img data-method="{name}" {size} alt="{words}" src="{picture_uri(found.picture)}">'
     if label == TRUTH:
