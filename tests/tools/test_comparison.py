@@ -168,6 +168,14 @@ def test_the_page_says_who_refuses_and_what_is_missing_and_needs_no_other_file()
     assert 'src="data:image/webp;base64,' in text and "http" not in text.replace("http-equiv", "")
 
 
+def test_the_page_says_which_methods_are_exact() -> None:
+    bad = {"ssim": 0.9}
+    outcomes = [made_up("one"), made_up("two", ldt=bad, envmap=bad | {"ssim_of_one": 1.0})]
+    assert "takes: <code>ldt</code>, <code>envmap</code>" not in written(*outcomes)
+    assert "takes: none; but for reflections of reflections: <code>envmap</code>." in written(*outcomes)
+    assert "takes: <code>envmap</code>, <code>ldt</code>; but" in written(outcomes[0])
+
+
 @pytest.fixture(scope="module")
 def window(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
     program = browser()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -95,8 +95,14 @@ def _introduction(outcomes: Sequence[SceneOutcome], circumstances: Circumstances
 def _answers(outcomes: Sequence[SceneOutcome], entries: Sequence[Entry], rows: Sequence[Overall]) -> str:
     """What most readers come for."""
     count = len(outcomes)
+
+    def named(those: Iterable[Overall]) -> str:
+        return (
+            ", ".join(_code(row.label) + ("" if row.scenes == count else f" ({row.scenes})") for row in those) or "none"
+        )
+
     exact = [row for row in rows if row.worst >= EXACT and row.label != TRUTH]
-    named = [_code(row.label) + ("" if row.scenes == count else f" ({row.scenes} of {count})") for row in exact]
+    but_for_more = [row for row in rows if row not in exact and (row.worst_of_one or 0.0) >= EXACT]
     kinds = {"first frame": lambda figures: figures.first, "later frames": lambda figures: figures.later}
     fast = [
         f"{kind}: " + ", ".join(f"{_code(label)} in {times}" for label, times in wins(outcomes, milliseconds_of))
@@ -109,8 +115,8 @@ def _answers(outcomes: Sequence[SceneOutcome], entries: Sequence[Entry], rows: S
     ]
     return (
         '<dl class="answers"><dt>Which method is exact?</dt>'
-        f"<dd>{_code(TRUTH)}, by definition. With SSIM of {EXACT:g} or more in all scenes that it takes: "
-        f"{', '.join(named) or 'none'}.</dd>"
+        f"<dd>{_code(TRUTH)}, by definition. With SSIM of {EXACT:g} or more in all scenes, or in all of so many that it "
+        f"takes: {named(exact)}; but for reflections of reflections: {named(but_for_more)}.</dd>"
         f"<dt>Which is fastest at SSIM {GOOD:g} or more?</dt>"
         f"<dd>Of {count} scenes, {'; '.join(fast)}.</dd>"
         "<dt>When to choose which, and what does each need of its mirrors?</dt>"
