@@ -97,9 +97,8 @@ def _answers(outcomes: Sequence[SceneOutcome], entries: Sequence[Entry], rows: S
     count = len(outcomes)
 
     def named(those: Iterable[Overall]) -> str:
-        return (
-            ", ".join(_code(row.label) + ("" if row.scenes == count else f" ({row.scenes})") for row in those) or "none"
-        )
+        taken = {row.label: "" if row.scenes == count else f" (takes {row.scenes} of {count})" for row in those}
+        return ", ".join(_code(label) + words for label, words in taken.items()) or "none"
 
     exact = [row for row in rows if row.worst >= EXACT and row.label != TRUTH]
     but_for_more = [row for row in rows if row not in exact and (row.worst_of_one or 0.0) >= EXACT]
@@ -115,8 +114,8 @@ def _answers(outcomes: Sequence[SceneOutcome], entries: Sequence[Entry], rows: S
     ]
     return (
         '<dl class="answers"><dt>Which method is exact?</dt>'
-        f"<dd>{_code(TRUTH)}, by definition. With SSIM of {EXACT:g} or more in all scenes, or in all of so many that it "
-        f"takes: {named(exact)}; but for reflections of reflections: {named(but_for_more)}.</dd>"
+        f"<dd>{_code(TRUTH)}, by definition. With SSIM of {EXACT:g} or more in all scenes that it takes: "
+        f"{named(exact)}; but for reflections of reflections: {named(but_for_more)}.</dd>"
         f"<dt>Which is fastest at SSIM {GOOD:g} or more?</dt>"
         f"<dd>Of {count} scenes, {'; '.join(fast)}.</dd>"
         "<dt>When to choose which, and what does each need of its mirrors?</dt>"
