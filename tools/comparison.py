@@ -11,6 +11,7 @@ in LDTREFL_MESH_PATH are left out by name.
 from __future__ import annotations
 
 import argparse
+import gc
 import sys
 import time
 from pathlib import Path
@@ -74,6 +75,8 @@ def main() -> None:
             missing.append(f"{name}, whose meshes are not in LDTREFL_MESH_PATH")
             print(f"left out: {missing[-1]}", file=sys.stderr)
             continue
+        gc.collect()
+        gc.freeze()  # all that is there: else it would be searched for garbage before each measurement of memory
         outcomes.append(compared(name, scene, methods))
         print(f"{name}: {time.perf_counter() - start:.1f} s", flush=True)
     if not outcomes:

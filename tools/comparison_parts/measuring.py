@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import gc
 import statistics
 import time
 from collections.abc import Callable, Sequence
@@ -103,8 +102,6 @@ class _Truth:
 
 def compared(name: str, scene: Scene, entries: Sequence[Entry]) -> SceneOutcome:
     """Render a scene by all methods, with one sample of a pixel."""
-    gc.collect()
-    gc.freeze()  # all that is there: else it would be searched before each measurement of memory
     truth = _Truth(scene)
     found = {entry.label: _without_later(scene, entry, truth) for entry in entries}
     firsts = {label: outcome.figures.first for label, outcome in found.items() if outcome.figures is not None}
