@@ -78,6 +78,7 @@ def main() -> None:
         gc.collect()
         gc.freeze()  # all that is there: else it would be searched for garbage before each measurement of memory
         outcomes.append(compared(name, scene, methods))
+        gc.unfreeze()
         print(f"{name}: {time.perf_counter() - start:.1f} s", flush=True)
     if not outcomes:
         raise InputError("no scene is left")
