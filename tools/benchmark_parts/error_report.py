@@ -40,8 +40,8 @@ STYLES = {
 }
 """Color and marker of each curve: families of methods have a marker each."""
 
-LARGER = "s*"
-"""Markers that are drawn larger, for others lie upon them."""
+LARGER = ("bvh", "bvh, decimated", "envmap infinite", "planar")
+"""Curves with larger markers, for others lie upon them."""
 
 
 def error_plot(points: list[ErrorPoint]) -> Figure:
@@ -70,7 +70,7 @@ def _draw_panel(panel: Axes, points: list[ErrorPoint]) -> None:
         times = [point["milliseconds"]["median"] for point in along]
         errors = [max(point["flip"], LEAST_ERROR) for point in along]
         usual = [i for i, point in enumerate(along) if point["is_usual"]]
-        style: dict[str, Any] = {"color": color, "marker": marker, "markersize": 9 if marker in LARGER else 6}
+        style: dict[str, Any] = {"color": color, "marker": marker, "markersize": 9 if curve in LARGER else 6}
         panel.plot(times, errors, fillstyle="none", linewidth=1.2, **style)
         panel.plot([times[i] for i in usual], [errors[i] for i in usual], linestyle="none", **style)
         panel.plot([], [], label=curve, linewidth=1.2, **style)

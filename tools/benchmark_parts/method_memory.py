@@ -13,7 +13,7 @@ import sys
 from ldtrefl.frame.result import Frame
 from ldtrefl.renderer import Renderer
 
-from .growth import growth_in_own_process, growth_of
+from .growth import give_back, growth_in_own_process, growth_of
 from .method_runs import Run
 from .result import Memory
 
@@ -36,9 +36,11 @@ def _growth(run: Run, size: tuple[int, int]) -> Memory:
 
 
 def _frames(run: Run, size: tuple[int, int]) -> tuple[Renderer, list[Frame]]:
-    """A renderer, and two frames of it."""
+    """A renderer, and two frames of it; what they needed meanwhile is given back."""
     renderer = run.renderer(*size)
-    return renderer, [renderer.render() for _ in range(2)]
+    frames = [renderer.render() for _ in range(2)]
+    give_back()
+    return renderer, frames
 
 
 if __name__ == "__main__":
