@@ -15,7 +15,7 @@ from .tables import table
 LEAST_ERROR = 1e-7
 """What an error of 0 is drawn as, for the axis is logarithmic."""
 
-MILLISECONDS = [step * 10**power for power in range(6) for step in (1, 1.5, 2, 3, 5, 7)]
+MILLISECONDS = [step * 10**power for power in range(6) for step in (1, 2, 5)]
 """What the axis of times may be marked with."""
 
 STYLES = {
@@ -76,7 +76,7 @@ def _draw_panel(panel: Axes, points: list[ErrorPoint]) -> None:
         panel.plot([], [], label=curve, linewidth=1.2, **style)
     panel.set(xscale="log", yscale="log")
     panel.xaxis.set_major_locator(FixedLocator(MILLISECONDS))
-    panel.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    panel.xaxis.set_major_formatter(StrMethodFormatter("{x:,g}"))
     panel.xaxis.set_minor_locator(NullLocator())
     panel.grid(True, alpha=0.3)
 
