@@ -6,11 +6,7 @@ float32 vertices for rivals) and has built a small mesh before, so that code and
 
 from __future__ import annotations
 
-import ctypes
-import gc
 import json
-import os
-import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -18,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from .growth import growth_in_own_process, growth_of
 from .models import Model, load
 from .ours import Caster, Exact, Ours, Peeled
 from .ray_tracer import RayTracer
@@ -29,8 +26,6 @@ MEMORY_MESHES = ("knot 10 k", "knot 96 k", "knot 2 M", "knot 10 M", "lucy.ply lo
 
 SMALL = "knot 1 k"
 """The mesh that a process builds first, so that code and pools are there."""
-SECONDS = 300.0
-"""After which a builder's process is given up."""
 
 EVERYBODY: tuple[type[RayTracer], ...] = (Peeled, Exact, Caster, *(kind for kind in RIVALS if kind.is_default))
 
@@ -43,10 +38,7 @@ def memory_of_mesh(mesh: Model, tracers: Sequence[type[RayTracer]]) -> MemoryRow
         np.save(Path(folder) / "vertices.npy", mesh.vertices.astype(np.float64))
         np.save(Path(folder) / "faces.npy", mesh.faces)
         for name in names:
-            command = [sys.executable, "-m", "benchmark_parts.memory", name, folder]
-            environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-            done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=SECONDS, check=True)
-            builders[name] = json.loads(done.stdout.splitlines()[-1])
+            builders[name] = growth_in_own_process("memory", name, folder)
     own = 8 * mesh.vertices.size + mesh.faces.nbytes
     return {"mesh": mesh.name, "triangles": len(mesh.faces), "mesh_bytes": own, "builders": builders}
 
@@ -69,20 +61,7 @@ def _growth(name: str, folder: Path) -> Memory:
     vertices = vertices.astype(as_taken, copy=False)
     warm_up = builder(small.vertices.astype(as_taken), small.faces)
     del warm_up, small
-    gc.collect()
-    ctypes.CDLL(None).malloc_trim(0)
-    Path("/proc/self/clear_refs").write_text("5")  # the peak counts from now
-    before = _status("VmRSS")
-    built = builder(vertices, faces)
-    found: Memory = {"kept": max(_status("VmRSS") - before, 0), "peak": max(_status("VmHWM") - before, 0)}
-    del built
-    return found
-
-
-def _status(key: str) -> int:
-    """Bytes of a line of this process's status."""
-    lines = Path("/proc/self/status").read_text().splitlines()
-    return next(1024 * int(line.split()[1]) for line in lines if line.startswith(f"{key}:"))
+    return growth_of(lambda: builder(vertices, faces))
 
 
 if __name__ == "__main__":
