@@ -13,6 +13,7 @@ from ldtrefl.files.atomic_write import written_whole
 from .error_report import error_plot, error_tables
 from .frame_tables import frames_before_tables, rival_frames_tables, start_table
 from .models import KNOTS
+from .paper import TABLE_1_COLUMNS, TABLE_2_COLUMNS, table_1_rows, table_2_rows
 from .result import Result
 from .tables import build_tables, memory_table, number, rays_tables, table
 from .tracing import OLD_KIND
@@ -120,16 +121,10 @@ def _scaling_line(result: Result) -> list[str]:
 
 
 def _paper_tables(result: Result) -> list[str]:
-    body = []
-    for model, entry in result["paper"]["table_1"].items():
-        paper, ours = entry["paper"], entry["ours"]
-        theirs = [f"{model}, {paper['triangles']}", f"{paper['layers']}, {paper['milliseconds']:.1f}"]
-        mine = [f"{ours['model']}, {ours['triangles']}", f"{ours['layers']}, {ours['milliseconds']:.1f}"]
-        body.append(theirs + mine)
-    lines = ["## The paper's tables", ""]
-    lines += table(["model", "paper: layers, ms (GeForce 7800)", "ours", "layers, ms (this CPU)"], body)
-    body = []
-    for name, scene in result["paper"]["table_2"].items():
-        total, by_search = sum(scene["paper"].values()), scene["ours"]
-        body.append([name, f"{total:.1f}", f"{by_search['linear']:.1f}", f"{by_search['exact']:.1f}"])
-    return lines + table(["scene", "paper: reflector + reflection ms", "ours: linear", "exact"], body)
+    found = result["paper"]
+    return [
+        "## The paper's tables",
+        "",
+        *table(TABLE_1_COLUMNS, table_1_rows(found)),
+        *table(TABLE_2_COLUMNS, table_2_rows(found)),
+    ]
