@@ -7,6 +7,7 @@ import warp as wp
 
 from ldtrefl.device import launch
 from ldtrefl.device.stats import Stats
+from ldtrefl.methods import find_method
 from ldtrefl.methods.virtual.bisector_places import BisectorPlaces
 from ldtrefl.methods.virtual.reflector_texture import texture_of, wider
 from ldtrefl.methods.virtual.vertex import VirtualVertex
@@ -31,8 +32,7 @@ COARSE = {"paper/bar": 3, "paper/tablecloth": 4, "teapot": 3}
 """Scenes with coarse objects, and the levels up to which full tessellation takes no longer than a minute."""
 
 QUICK_LEVELS = 1
-DEFAULT_LEVELS = 5
-DEFAULT = 0.0005
+DEFAULT_LEVELS, DEFAULT = (find_method("tessellation").options()[name][0] for name in ("levels", "threshold"))
 """The options of ``tessellation`` if nothing is said."""
 
 FINER = 0.0001

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from ldtrefl.methods import find_method
+
 from .table import Cell, Table
 from .tessellated import picture
 
@@ -20,7 +22,7 @@ THRESHOLDS = {
 }
 """Of its Fig. 8, with its words."""
 
-OURS = 0.0005
+OURS = float(find_method("tessellation").options()["threshold"][0])
 """The threshold of ``tessellation`` if nothing is said."""
 
 ADAPTIVE = 0.001
