@@ -11,12 +11,14 @@ told to use one (embreex's builds) is kept to one core.
 
     python tools/benchmark.py --only rival-frames --scenes "teapot;ball, knot 10 M"
                                          # three seconds a scene and more; 10 M triangles are timed only if asked for
+    python tools/benchmark.py --only methods               # every reflection method: error against time, memory
     python tools/benchmark.py --before ../other            # our frames and starts in turn with another checkout's
 
-Parts: rays, build, memory, frames (error against time, stages, error targets), rival-frames (whole frames beside
-Mitsuba's), start (process to picture), threads, paper. Real meshes are taken from LDTREFL_MESH_PATH where they are;
-kinds of rays are described in ``benchmark_parts/rays.py``, names of meshes in ``models.py``, rivals in ``rivals.py``,
-what is right in ``truth.py``, and scenes of whole frames in ``frame_scenes.py``.
+Parts: rays, build, memory, frames (stages, error targets), methods (every reflection method's error against time, and
+its memory), rival-frames (whole frames beside Mitsuba's), start (process to picture), threads, paper. Real meshes are
+taken from LDTREFL_MESH_PATH where they are; kinds of rays are described in ``benchmark_parts/rays.py``, names of meshes
+in ``models.py``, rivals in ``rivals.py``, what is right in ``truth.py``, scenes of whole frames in ``frame_scenes.py``,
+and methods with their parameters in ``method_runs.py``.
 """
 
 from __future__ import annotations
@@ -32,8 +34,9 @@ from benchmark_parts import cores
 from benchmark_parts.building import build_line, builds_of_mesh
 from benchmark_parts.common import ROOT
 from benchmark_parts.frame_scenes import FRAME_SCENES
-from benchmark_parts.frames import error_against_time, error_targets, frame_stages
+from benchmark_parts.frames import error_targets, frame_stages
 from benchmark_parts.memory import MEMORY_MESHES, memory_line, memory_of_mesh
+from benchmark_parts.method_errors import error_against_time
 from benchmark_parts.models import OUTLIERS, every_name, model
 from benchmark_parts.ours import OURS
 from benchmark_parts.paper import paper_tables
@@ -60,7 +63,7 @@ from ldtrefl.files.atomic_write import written_whole
 
 TRACERS = (*OURS, *RIVALS)
 ALL_TRACERS = ", ".join(tracer.name for tracer in TRACERS)
-PARTS = ("rays", "build", "memory", "frames", "rival-frames", "start", "threads", "paper")
+PARTS = ("rays", "build", "memory", "frames", "methods", "rival-frames", "start", "threads", "paper")
 PARTS_BEFORE = ("rival-frames", "start")
 """The parts that are measured beside another checkout."""
 QUICK_MESHES = ("knot 1 k", "knot 10 k", "knot 10 k outlier 1e3")
@@ -171,10 +174,11 @@ def measure(arguments: argparse.Namespace, result: Result) -> None:
             print(memory_line(result["memory"][-1]), flush=True)
     if "frames" in wanted:
         result |= {
-            "error_against_time": error_against_time(quick, frame_rounds),
             "stages": frame_stages(quick, frame_rounds),
             "error_targets": error_targets(quick, frame_rounds),
         }
+    if "methods" in wanted:
+        result["error_against_time"] = error_against_time(quick, frame_rounds)
     if "rival-frames" in wanted:
         _whole_frames(arguments, frame_rounds, result)
     if "start" in wanted:

@@ -81,7 +81,7 @@ class Fermat(RayMethod):
         """Area in pixels of the image that the triangle of samples covers when a search ends, 0 to 100."""
         levels: Annotated[int, Field(strict=True, ge=0, le=8)] = 0
         """Rounds in which triangles are divided where the mirror bends them, 0 to 8."""
-        threshold: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0005
+        threshold: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0002
         """The error of an edge, 0 to 1, from which it is divided."""
         crack_free: Annotated[bool, Field(strict=True)] = True
         """Whether edges are divided by their own errors, so that no holes open between triangles."""

@@ -50,7 +50,7 @@ class Tessellation(RayMethod):
         """Texels of that view along a pixel, 0.25 to 8."""
         levels: Annotated[int, Field(strict=True, ge=0, le=8)] = 5
         """Rounds in which triangles are divided where the mirror bends them, 0 to 8."""
-        threshold: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0005
+        threshold: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0002
         """The error of an edge, 0 to 1, from which it is divided."""
         crack_free: Annotated[bool, Field(strict=True)] = False
         """Whether edges are divided by their own errors, so that no holes open between triangles."""

@@ -9,6 +9,7 @@ from skimage.metrics import structural_similarity
 import ldtrefl
 from ldtrefl.base.errors import NotForThisScene
 from ldtrefl.scene.description import Camera, Environment, Light, Lighting, Material, Object, Scene
+from tests.conftest import SCENES
 
 MIRROR = Material(albedo=0.02, mirror=0.9)
 BALL = Object(name="ball", shape="sphere", material=MIRROR)
@@ -73,6 +74,22 @@ def test_a_flat_mirror_is_exact() -> None:
     planar = ldtrefl.render(scene(flat), "planar").image
     off = np.abs(frame.image - planar).max(axis=2)[frame.reflector_mask]
     assert (off > 0.02).mean() < 0.01
+
+
+def test_a_bowl_shows_far_things_upside_down_and_nothing_that_it_walls_off() -> None:
+    """The paper's Fig. 11: what is far is seen once. The table that the bowl stands on is not seen in it."""
+    given = ldtrefl.load_scene(SCENES / "paper" / "bowl.toml")
+    given = given.with_camera(dataclasses.replace(given.camera, width=192, height=128))
+    frames = [ldtrefl.render(given, "fermat", samples=1), ldtrefl.render(given, "bvh", samples=1, max_bounces=1)]
+    assert frames[0].hits is not None and frames[1].hits is not None
+    found, truth = (frame.hits.object[frame.reflector_mask] for frame in frames)
+    own = given.number_of("bowl")  # what is reflected twice
+    is_once = (truth >= 0) & (truth != own)
+    assert (found[is_once] == truth[is_once]).mean() > 0.65
+    assert (found[truth == own] < 0).mean() > 0.95
+    names = np.array([entry.called for entry in given.objects])
+    assert {"ceiling", "lamp"} <= set(names[np.unique(found[found >= 0])])
+    assert np.isin(names[found[found >= 0]], ["floor", "table"]).mean() < 0.01
 
 
 def test_long_triangles_have_straight_reflections() -> None:

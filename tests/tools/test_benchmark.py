@@ -190,6 +190,9 @@ def test_benchmark_writes_what_it_promises(tmp_path: Path) -> None:
             wrong = kind["errors"]["ldt exact"]
             assert wrong["wrong_hits"] + wrong["wrong_misses"] <= 0.01
             assert {"median", "min", "max"} <= set(kind["milliseconds"]["1"]["kernel"]["bvh"])
+    memory = {point["curve"]: point["memory"] for point in result["error_against_time"] if point["memory"]}
+    assert set(memory) == {"ldt balanced", "planar"}  # the others' takes too long for a quick run
+    assert all(0 < entry["kept"] <= entry["peak"] for entry in memory.values())
     report = (tmp_path / "benchmark.md").read_text()
     assert all(row["mesh"] in report for row in result["rays"])
     assert all(note in report for note in result["notes"])

@@ -16,6 +16,7 @@ ROOT = Path(__file__).parent.parent.parent
 SKIPS_BUT_FRAMES = [name for name in skip_names() if name != "frames"]
 """Every skip but that of a frame which is the same as the last: so each frame is made anew, and can be timed."""
 
+MIRROR = Material(albedo=(0.02,) * 3, mirror=(0.9,) * 3)
 
 UNIT_SPACE = np.zeros(3), 1.0
 """The ``unit_frame`` of rays that are in unit space already."""
@@ -53,6 +54,19 @@ class Batch:
 
 def knot_scene(segments: tuple[int, int], width: int, height: int) -> Scene:
     """A mirror ball and a torus knot."""
+    ball = Object(name="ball", shape="sphere", material=MIRROR)
+    return _with_knot(ball, segments, width, height)
+
+
+def wall_scene(segments: tuple[int, int], width: int, height: int) -> Scene:
+    """The same knot before a flat mirror."""
+    wall = Object(
+        name="wall", shape="plane", rotate=(1, 0, 0, 90), scale=1.6, translate=(1.0, 1.0, 0.0), material=MIRROR
+    )
+    return _with_knot(wall, segments, width, height)
+
+
+def _with_knot(mirror: Object, segments: tuple[int, int], width: int, height: int) -> Scene:
     knot = Object(
         name="knot",
         shape="torus_knot",
@@ -64,8 +78,5 @@ def knot_scene(segments: tuple[int, int], width: int, height: int) -> Scene:
     return Scene(
         camera=Camera(eye=(-0.5, -4.5, 0.8), look_at=(0.4, 0, 0.0), fov_y=36, width=width, height=height),
         lights=(Light(kind="directional", direction=(0.3, 0.8, -0.7), radiance=(1.0, 1.0, 1.0)),),
-        objects=(
-            Object(name="ball", shape="sphere", material=Material(albedo=(0.02,) * 3, mirror=(0.9,) * 3)),
-            knot,
-        ),
+        objects=(mirror, knot),
     )

@@ -1,4 +1,4 @@
-"""Whole frames: error against time, stages, and what ``error`` asks for against what comes of it."""
+"""Whole frames: stages, and what ``error`` asks for against what comes of it."""
 
 from __future__ import annotations
 
@@ -6,63 +6,18 @@ import dataclasses
 import itertools
 import os
 import statistics
-from typing import Any
 
 import numpy as np
-from timing import timed_in_turn
 
 import ldtrefl
 from ldtrefl.compare import metrics
-from ldtrefl.device import launch
 from ldtrefl.renderer import Renderer
 from ldtrefl.scene.description import Scene
 
 from .common import ROOT, SKIPS_BUT_FRAMES, knot_scene
 from .our_frames import median_stages
 from .paper import PAPER_TABLE_2
-from .result import ErrorPoint, ErrorTarget
-
-
-def error_against_time(quick: bool, rounds: int) -> list[ErrorPoint]:
-    """Frames of the ball and the knot by every method and parameter: time per frame, maps kept, and image error."""
-    ldtrefl.set_threads()
-    size = (192, 128) if quick else (768, 512)
-    full = (200, 25) if quick else (2000, 125)
-    scene = knot_scene(full, *size)
-    truth = ldtrefl.render(scene, "bvh", samples=1)
-    mask = truth.reflector_mask
-    curves: list[tuple[str, str, Scene, str, dict[str, Any]]] = [("bvh", "full mesh", scene, "bvh", {})]
-    for columns, rows in [(40, 8), (100, 12), (200, 25), (600, 80)][: 2 if quick else 4]:
-        label = f"{2 * columns * rows} triangles"
-        curves.append(("bvh, decimated", label, knot_scene((columns, rows), *size), "bvh", {}))
-    for resolution in (64, 256) if quick else (32, 64, 128, 256, 512):
-        curves.append(("ldt balanced", f"{resolution}", scene, "ldt", {"resolution": resolution}))
-        curves.append(("ldt fast", f"{resolution}", scene, "ldt", {"resolution": resolution, "quality": "fast"}))
-    curves.append(("ldt exact", "every triangle", scene, "ldt", {"quality": "exact"}))
-    for steps in (32, 256) if quick else (16, 32, 64, 128, 256, 512, 1024):
-        curves.append(("ldt linear", f"{steps} steps", scene, "ldt", {"search": "linear", "linear_steps": steps}))
-    for resolution in (64, 256) if quick else (64, 128, 256, 512, 1024):
-        curves.append(("envmap", f"{resolution}", scene, "envmap", {"resolution": resolution}))
-    points: list[ErrorPoint] = []
-    renderers = [
-        Renderer(where, method, skip=SKIPS_BUT_FRAMES, **options, samples=1) for _, _, where, method, options in curves
-    ]
-    jobs = {str(i): renderer.render for i, renderer in enumerate(renderers)}
-    times = timed_in_turn(jobs, max(2, rounds // 2))
-    for i, (curve, label, _, _, _) in enumerate(curves):
-        image = renderers[i].render().image
-        points.append(
-            {
-                "curve": curve,
-                "label": label,
-                "threads": launch.thread_count(),
-                "milliseconds": times[str(i)],
-                "ssim": metrics.ssim(image, truth.image, mask),
-                "flip": metrics.flip(image, truth.image, mask),
-                "relmse": metrics.relmse(image, truth.image, mask),
-            }
-        )
-    return points
+from .result import ErrorTarget
 
 
 def frame_stages(quick: bool, rounds: int) -> dict[str, dict[str, float]]:

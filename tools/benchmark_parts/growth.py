@@ -22,14 +22,19 @@ def growth_of(make: Callable[[], object]) -> Memory:
 
     Whatever is made for the first time brings code and pools with it: make something small of its kind before.
     """
-    gc.collect()
-    ctypes.CDLL(None).malloc_trim(0)
+    give_back()
     Path("/proc/self/clear_refs").write_text("5")  # the peak counts from now
     before = _status("VmRSS")
     made = make()
     found: Memory = {"kept": max(_status("VmRSS") - before, 0), "peak": max(_status("VmHWM") - before, 0)}
     del made
     return found
+
+
+def give_back() -> None:
+    """Give the system back what is free, so that it does not count as kept."""
+    gc.collect()
+    ctypes.CDLL(None).malloc_trim(0)
 
 
 def growth_in_own_process(module: str, *arguments: str) -> Memory:

@@ -57,6 +57,29 @@ PAPER_TABLE_2 = {  # scene: milliseconds for reflector and reflection on the sam
     "three_dancers": (1.029, 6.261),
 }
 
+TABLE_1_COLUMNS = ["model", "paper: layers, ms (GeForce 7800)", "ours", "layers, ms (this CPU)"]
+TABLE_2_COLUMNS = ["scene", "paper: reflector + reflection ms", "ours: linear", "exact"]
+
+
+def table_1_rows(found: PaperTables) -> list[list[str]]:
+    """The cells of Table 1."""
+    rows = []
+    for model, entry in found["table_1"].items():
+        paper, ours = entry["paper"], entry["ours"]
+        theirs = [f"{model}, {paper['triangles']}", f"{paper['layers']}, {paper['milliseconds']:.1f}"]
+        mine = [f"{ours['model']}, {ours['triangles']}", f"{ours['layers']}, {ours['milliseconds']:.1f}"]
+        rows.append(theirs + mine)
+    return rows
+
+
+def table_2_rows(found: PaperTables) -> list[list[str]]:
+    """The cells of Table 2."""
+    rows = []
+    for name, scene in found["table_2"].items():
+        figures = [sum(scene["paper"].values()), scene["ours"]["linear"], scene["ours"]["exact"]]
+        rows.append([name, *(f"{figure:.1f}" for figure in figures)])
+    return rows
+
 
 def paper_tables(quick: bool, rounds: int) -> PaperTables:
     """The paper's Tables 1 and 2 beside ours: their milliseconds on a GeForce 7800, ours on this CPU."""

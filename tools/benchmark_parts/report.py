@@ -6,14 +6,15 @@ from pathlib import Path
 from typing import cast
 
 import matplotlib
-import numpy as np
 from timing import Summary
 
 from ldtrefl.files.atomic_write import written_whole
 
+from .error_report import error_plot, error_tables
 from .frame_tables import frames_before_tables, rival_frames_tables, start_table
 from .models import KNOTS
-from .result import ErrorPoint, Result
+from .paper import TABLE_1_COLUMNS, TABLE_2_COLUMNS, table_1_rows, table_2_rows
+from .result import Result
 from .tables import build_tables, memory_table, number, rays_tables, table
 from .tracing import OLD_KIND
 
@@ -21,15 +22,12 @@ matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 from matplotlib.figure import Figure
 
-LEAST_ERROR = 1e-7
-"""What an error of 0 is drawn as, for the axis is logarithmic."""
-
 
 def draw_plots(result: Result, folder: Path) -> None:
     """Error against time, and time, build time and bytes against triangles, of the parts that were run."""
     threads = str(result["threads"][0])
     if "error_against_time" in result:
-        _plot_error_against_time(result["error_against_time"], folder)
+        _save(error_plot(result["error_against_time"]), folder / "error_against_time.png")
     if "rays" in result:
         knots = {row["triangles"]: row["kinds"] for row in result["rays"] if row["mesh"] in KNOTS}
         times = {
@@ -50,24 +48,9 @@ def _medians(times: dict[int, dict[str, Summary]]) -> dict[int, dict[str, float]
     return {n: {name: entry["median"] for name, entry in by_tracer.items()} for n, by_tracer in times.items()}
 
 
-def _plot_error_against_time(points: list[ErrorPoint], folder: Path) -> None:
-    figure, axes = plt.subplots(figsize=(7, 5))
-    curves: dict[str, list[tuple[float, float]]] = {}
-    for point in points:
-        curves.setdefault(point["curve"], []).append((point["milliseconds"]["median"], point["flip"]))
-    for curve, pairs in curves.items():
-        times, errors = zip(*pairs, strict=True)
-        axes.plot(times, np.maximum(errors, LEAST_ERROR), "o-", label=curve, markersize=4)
-    axes.set(xscale="log", yscale="log", xlabel="milliseconds per frame", ylabel="FLIP over the mirror (1e-7 = none)")
-    axes.set_title("Error against time: mirror ball and torus knot")
-    axes.grid(True, which="both", alpha=0.3)
-    axes.legend()
-    _save(figure, folder / "error_against_time.png")
-
-
 def _plot_against_triangles(values: dict[int, dict[str, float]], label: str, path: Path) -> None:
     """A curve for each tracer: {triangles: {tracer: value}}."""
-    figure, axes = plt.subplots(figsize=(7, 5))
+    figure, axes = plt.subplots(figsize=(7, 5), layout="tight")
     for tracer in dict.fromkeys(name for by_tracer in values.values() for name in by_tracer):
         known = [(n, by_tracer[tracer]) for n, by_tracer in sorted(values.items()) if tracer in by_tracer]
         axes.plot(*zip(*known, strict=True), "o-", label=tracer, markersize=4)
@@ -79,7 +62,6 @@ def _plot_against_triangles(values: dict[int, dict[str, float]], label: str, pat
 
 
 def _save(figure: Figure, path: Path) -> None:
-    figure.tight_layout()
     with written_whole(path) as scratch:
         figure.savefig(scratch, dpi=110)
     plt.close(figure)
@@ -107,6 +89,7 @@ def reading(result: Result) -> str:
         ("build", build_tables),
         ("memory", memory_table),
         ("stages", _frame_tables),
+        ("error_against_time", error_tables),
         ("rival_frames", rival_frames_tables),
         ("frames_before", frames_before_tables),
         ("start", start_table),
@@ -129,12 +112,7 @@ def _frame_tables(result: Result) -> list[str]:
         sizes = [f"{row['bytes'] / 1e6:.2f}", f"{row['peel']:.1f}", f"{row['march']:.1f}"]
         body.append([row["scene"], row["search"], str(row["error"] or "usual 256"), *figures, *sizes])
     lines += table(["scene", "search", "error, pixels", "p50", "p99", "MB", "peel, ms", "march, ms"], body)
-    lines += ["## Error against time", ""]
-    body = []
-    for point in result["error_against_time"]:
-        figures = [f"{point['milliseconds']['median']:.1f}", f"{point['ssim']:.5f}", f"{point['flip']:.6f}"]
-        body.append([point["curve"], point["label"], *figures])
-    return lines + table(["method", "parameter", "ms", "SSIM", "FLIP"], body)
+    return lines
 
 
 def _scaling_line(result: Result) -> list[str]:
@@ -143,16 +121,10 @@ def _scaling_line(result: Result) -> list[str]:
 
 
 def _paper_tables(result: Result) -> list[str]:
-    body = []
-    for model, entry in result["paper"]["table_1"].items():
-        paper, ours = entry["paper"], entry["ours"]
-        theirs = [f"{model}, {paper['triangles']}", f"{paper['layers']}, {paper['milliseconds']:.1f}"]
-        mine = [f"{ours['model']}, {ours['triangles']}", f"{ours['layers']}, {ours['milliseconds']:.1f}"]
-        body.append(theirs + mine)
-    lines = ["## The paper's tables", ""]
-    lines += table(["model", "paper: layers, ms (GeForce 7800)", "ours", "layers, ms (this CPU)"], body)
-    body = []
-    for name, scene in result["paper"]["table_2"].items():
-        total, by_search = sum(scene["paper"].values()), scene["ours"]
-        body.append([name, f"{total:.1f}", f"{by_search['linear']:.1f}", f"{by_search['exact']:.1f}"])
-    return lines + table(["scene", "paper: reflector + reflection ms", "ours: linear", "exact"], body)
+    found = result["paper"]
+    return [
+        "## The paper's tables",
+        "",
+        *table(TABLE_1_COLUMNS, table_1_rows(found)),
+        *table(TABLE_2_COLUMNS, table_2_rows(found)),
+    ]

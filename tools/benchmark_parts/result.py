@@ -57,7 +57,7 @@ class BuildRow(TypedDict):
 
 
 class Memory(TypedDict):
-    """Bytes by which a process grows when it builds."""
+    """Bytes by which a process grows when it builds, or makes frames."""
 
     kept: int
     peak: int
@@ -75,6 +75,7 @@ class MemoryRow(TypedDict):
 class ErrorPoint(TypedDict):
     """A frame by one method with one parameter: its time and its error over the mirror."""
 
+    scene: str
     curve: str
     """The method."""
     label: str
@@ -84,6 +85,10 @@ class ErrorPoint(TypedDict):
     ssim: float
     flip: float
     relmse: float
+    is_usual: bool
+    """Whether the parameter is the one that the method has if none is given."""
+    memory: Memory | None
+    """Of a renderer and two frames of it, where it was measured."""
 
 
 class ErrorTarget(TypedDict):

@@ -1,4 +1,4 @@
-"""What the comparisons with Mitsuba are asked on the command line, and how they write what they found."""
+"""What comparisons are asked on the command line, and how they write what they found."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ RESULTS = Path(__file__).parent.parent / "results"
 
 
 def arguments(description: str | None, scenes: Iterable[str], quick: str) -> argparse.Namespace:
-    """``only``, a list of names of scenes or None; ``quick``; ``output``, a folder, or None to write on the screen.
+    """``only``, a list of names, or None; ``quick``; ``output``, a folder, or None to write on the screen.
 
     Args:
         description: what the tool does.
-        scenes: the names that ``--only`` may have.
+        scenes: the names that ``--only`` may have, of scenes or of parts.
         quick: what ``--quick`` makes.
     """
     parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help=quick)
-    parser.add_argument("--only", choices=list(scenes), action="append", help="this scene alone; may be repeated")
+    parser.add_argument("--only", choices=list(scenes), action="append", help="this one alone; may be repeated")
     parser.add_argument("-o", "--output", type=Path, help="folder to write to; default of a full run: tools/results")
     given = parser.parse_args()
     if given.output is None and not (given.quick or given.only):

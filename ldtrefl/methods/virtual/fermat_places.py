@@ -8,8 +8,8 @@ import warp as wp
 
 from ldtrefl.device import launch
 from ldtrefl.device.stats import Stats
-from ldtrefl.methods.virtual.fermat_search import SearchLimits, fermat_search
-from ldtrefl.methods.virtual.radius_map import RadiusMap, radial_point
+from ldtrefl.methods.virtual.fermat_search import Reflection, SearchLimits, fermat_search
+from ldtrefl.methods.virtual.radius_map import RadiusMap, met_radius, radial_point
 from ldtrefl.methods.virtual.silhouette import silhouette_point
 from ldtrefl.methods.virtual.subdivision import SurfacePoint, edge_errors_kernel
 from ldtrefl.methods.virtual.vertex import HIDDEN, VirtualVertex, not_seen, unfolded
@@ -21,7 +21,42 @@ VIEW_STEPS = wp.constant(4)
 EDGE_ON = wp.constant(wp.float64(1.0e-3))
 """Cosine of a view with a normal below which the surface is not looked for: the step would go far off."""
 
+WAY_STEPS = wp.constant(32)
+"""Points of the way from the reflection to a vertex that are looked at."""
+
+WAY_RADII = wp.constant(wp.float64(4.0))
+"""The length of the way that is looked at, in distances of the reflection from O: a reflector reaches no farther."""
+
+NEAR = wp.constant(wp.float64(1.0e-3))
+"""Share of the radius within which a point counts as on the surface."""
+
 search = fermat_search(RadiusMap, radial_point)
+
+
+@wp.func
+def is_walled_off(surface: RadiusMap, found: Reflection, eye: wp.vec3d, vertex: wp.vec3d) -> bool:
+    """Whether the way from a reflection to a vertex leads through the surface, and not through one of its holes.
+    Positions are from O."""
+    one, point = wp.float64(1.0), found.point
+    length = wp.length(vertex - point)
+    part = wp.min(one, WAY_RADII * wp.length(point) / length)
+    side = wp.where(wp.dot(found.normal, eye - point) < wp.float64(0.0), int(-1), int(1))
+    for step in range(WAY_STEPS):
+        share = (wp.float64(step) + one) / wp.float64(WAY_STEPS)
+        at = point + (part * share * share) * (vertex - point)
+        distance = wp.length(at)
+        radius = met_radius(radial_point(surface, at / distance))
+        now = int(0)
+        if radius > wp.float64(0.0):
+            now = side
+            if distance < (one - NEAR) * radius:
+                now = -1
+            elif distance > (one + NEAR) * radius:
+                now = 1
+        if side * now < 0:
+            return True
+        side = now
+    return False
 
 
 @launch.kernel
@@ -41,6 +76,9 @@ def find_vertices(
     eye, vertex = camera.eye - surface.centre, points[i]
     found = search(surface, eye, vertex - surface.centre, limits)
     made = not_seen()
+    if found.is_found != 0 and found.is_inside != 0:
+        if is_walled_off(surface, found, eye, vertex - surface.centre):
+            found.is_found = 0
     point = found.point
     if found.is_hidden != 0:
         point = silhouette_point(surface, eye, found.point)

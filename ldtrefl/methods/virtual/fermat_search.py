@@ -48,7 +48,7 @@ from ldtrefl.methods.virtual.fermat_samples import (
     weights_of_zero,
     with_replaced,
 )
-from ldtrefl.methods.virtual.radius_map import RadialPoint
+from ldtrefl.methods.virtual.radius_map import RadialPoint, met_radius
 
 LEAST_SINE = wp.constant(wp.float64(1.0e-12))
 """Squared sine of the angle between differences of gradients below which their equations are ill-conditioned: rounding
@@ -96,6 +96,7 @@ class Reflection:
     iterations: int  # samples taken after the first three, and returns to discarded ones
     is_found: int  # 1 if the residual is small, and E and V are on the side of the surface that E is on
     is_hidden: int  # 1 if it is small, and both are on the other side: the surface hides V from E
+    is_inside: int  # 1 if the eye is inside, or looks in through a hole
 
 
 @wp.func
@@ -154,6 +155,7 @@ def reflection_of(
     if of_eye * of_vertex > ZERO and found.residual <= limits.most_residual:
         found.is_found = wp.where(of_eye * side >= ZERO, 1, 0)
         found.is_hidden = 1 - found.is_found
+    found.is_inside = wp.where(side > ZERO, 0, 1)
     return found
 
 
@@ -190,7 +192,8 @@ def starter(surface_type: type, radial_point: Callable[..., RadialPoint]) -> Cal
     def first_samples(surface: surface_type, eye: wp.vec3d, vertex: wp.vec3d) -> Samples:
         """The triangle at the start (section 3.3.4): between the projections of V and E, and equilateral."""
         to_eye, to_vertex = direction_to(eye), direction_to(vertex)
-        of_eye, of_vertex = radial_point(surface, to_eye).radius, radial_point(surface, to_vertex).radius
+        of_eye = met_radius(radial_point(surface, to_eye))
+        of_vertex = met_radius(radial_point(surface, to_vertex))
         if of_eye == ZERO and of_vertex == ZERO:  # both look in from the open side
             to_eye, to_vertex = -to_eye, -to_vertex
         across = wp.cross(to_eye, to_vertex)
@@ -285,7 +288,7 @@ def fermat_search(surface_type: type, radial_point: Callable[..., RadialPoint]) 
             else:
                 goes_on = False
         side = ZERO
-        of_eye = radial_point(surface, direction_to(eye)).radius
+        of_eye = met_radius(radial_point(surface, direction_to(eye)))
         if of_eye > ZERO:
             side = wp.sign(wp.length(eye) - of_eye)
         found = reflection_of(samples, eye, vertex, side, limits)

@@ -48,6 +48,11 @@ PlaceVertices = Callable[[wp.array, wp.array], None]
 """``place(points, vertices_out)``: fills in the virtual vertices of (n,) vec3d points in device space."""
 
 
+BEFORE = 0.25
+"""How far before what is seen of a mirror a reflection point may lie, in radii of the mirror. Between the reflection
+points of a triangle's corners lie chords: on the inner side of a bowl they are before its surface."""
+
+
 @launch.kernel
 def find_depths(
     first: int,
@@ -106,6 +111,8 @@ class _Part:
     points: DrawnPoints
     ray_of: wp.array
     """(n,) int32: the ray that leaves it at each point."""
+    fronts: wp.array
+    """(n,) float: the least depth of a reflection point that may be seen there."""
     backs: wp.array
     """(n,) int64 of ``draw_back_faces``."""
 
@@ -169,7 +176,9 @@ class VirtualImage:
             first = wp.array(others.first_vertex, dtype=wp.int32, device=device)
             chunks = chunks_of(scene.triangle_counts[others.numbers], device)
             inputs = [self._camera, part.points, chunks, numbers, first, vertices, scene.records]
-            launch.launch(draw_virtual, chunks.shape[0], [*inputs, scene.triangle_numbers, part.backs, keys], device)
+            launch.launch(
+                draw_virtual, chunks.shape[0], [*inputs, scene.triangle_numbers, part.fronts, part.backs, keys], device
+            )
             first_of = np.zeros(len(scene.objects), np.int32)
             first_of[others.numbers] = others.first_vertex
             inputs = [self._camera, part.points, keys, part.ray_of, wp.array(first_of, dtype=wp.int32, device=device)]
@@ -189,7 +198,7 @@ class VirtualImage:
         with budget.given_back():
             pieces, vertices = subdivide(others)
             keys = wp.zeros_like(part.backs)
-            inputs = [self._camera, part.points, pieces, vertices, part.backs, keys]
+            inputs = [self._camera, part.points, pieces, vertices, part.fronts, part.backs, keys]
             launch.launch(draw_pieces, pieces.shape[0], inputs, device)
             inputs = [self._camera, part.points, keys, part.ray_of, pieces, vertices, scene.records]
             launch.launch(resolve_pieces, keys.shape[0], [*inputs, self._rays, self._hits], device)
@@ -216,8 +225,9 @@ class VirtualImage:
         points, order = self._points(rays)
         ray_of = wp.array(order.astype(np.int32), dtype=wp.int32, device=device)
         backs = wp.zeros(len(order), dtype=wp.int64, device=device)
-        self._draw_backs(points, ray_of, reflector, backs)
-        return _Part(points, ray_of, backs)
+        depth = self._draw_backs(points, ray_of, reflector, backs)
+        fronts = depth.numpy() - BEFORE * self._gbuffer.scene.objects[reflector].radius
+        return _Part(points, ray_of, wp.array(fronts, dtype=float, device=device), backs)
 
     def _points(self, rays: np.ndarray) -> tuple[DrawnPoints, np.ndarray]:
         """The points that these rays leave from, and (n,) the ray of each point."""
@@ -240,14 +250,15 @@ class VirtualImage:
         """Rows and pixels of a row of the band that is drawn, or that points lie in."""
         return self._gbuffer.band.rows, self._gbuffer.camera.width
 
-    def _draw_backs(self, points: DrawnPoints, ray_of: wp.array, reflector: int, backs: wp.array) -> None:
-        """Draw the frontmost back faces of a mirror behind what is seen of it."""
+    def _draw_backs(self, points: DrawnPoints, ray_of: wp.array, reflector: int, backs: wp.array) -> wp.array:
+        """Draw the frontmost back faces of a mirror behind what is seen of it; (n,) float depth of the latter."""
         scene, camera = self._gbuffer.scene, self._gbuffer.view.camera
         depth = wp.empty(ray_of.shape[0], dtype=float, device=scene.device)
         launch.launch(find_depths, ray_of.shape[0], [camera, self._given, ray_of, depth], scene.device)
         count = chunk_count(int(scene.triangle_counts[reflector]))
         inputs = [camera, points, depth, scene.records, reflector, backs]
         launch.launch(draw_back_faces, count, inputs, scene.device)
+        return depth
 
     def reflected(self, shadow: BoundTracer) -> ReflectedLight:
         """What reaches the reflector pixels by way of their mirrors, with shadows by this tracer."""

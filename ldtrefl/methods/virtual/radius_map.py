@@ -22,6 +22,7 @@ class RadiusMap:
     centre: wp.vec3d  # O, device space
     intervals: int  # along a side of a face, which has one node more
     values: wp.array(dtype=wp.vec4)  # (r, gradient) face by face, row by row; r is 0 where there is no surface
+    beyond: wp.array(dtype=wp.uint8)  # of each: 1 where the surface is continued beyond its rim (``rim.py``)
 
 
 @wp.struct
@@ -30,6 +31,7 @@ class RadialPoint:
 
     radius: wp.float64  # 0 where there is no surface
     gradient: wp.vec3d  # of the radius on the unit sphere, at right angles to the direction
+    is_beyond: int  # 1 beyond the surface's rim, where it is continued
 
 
 def node_directions(intervals: int) -> np.ndarray:
@@ -46,6 +48,12 @@ def node_directions(intervals: int) -> np.ndarray:
         faces.append(direction.reshape(-1, 3))
     every = np.concatenate(faces)
     return every / np.linalg.norm(every, axis=1, keepdims=True)
+
+
+@wp.func
+def met_radius(at: RadialPoint) -> wp.float64:
+    """The radius, where a surface is met; 0 in holes, though it may be continued there."""
+    return wp.where(at.is_beyond != 0, wp.float64(0.0), at.radius)
 
 
 @wp.func
@@ -76,5 +84,8 @@ def radial_point(surface: RadiusMap, direction: wp.vec3d) -> RadialPoint:
         mean = (wp.float64(1.0) - down) * upper + down * lower
         gradient = wp.vec3d(mean[1], mean[2], mean[3])
         found.radius = mean[0]
+        beside = int(surface.beyond[first]) + int(surface.beyond[first + 1])
+        beside += int(surface.beyond[first + count + 1]) + int(surface.beyond[first + count + 2])
+        found.is_beyond = wp.where(beside > 0, 1, 0)
         found.gradient = gradient - wp.dot(gradient, direction) * direction
     return found

@@ -3,6 +3,7 @@
 What is drawn to are points of the image, several in a pixel or one at its centre, sorted by pixel: no others exist, so
 a reflection is seen only through the reflector's own pixels. The depth test is that of Roger and Holzschuch 2006,
 section 3.3.6: by the distance from the reflection point, and only before the frontmost back faces of the reflector.
+Nor may the reflection point lie far before what is seen of the reflector: it would be another part of it.
 Triangles are those of ``geometry/perspective_raster.py``: what crosses the camera's plane needs no clipping, and
 neighbours overlap by a hair rather than leave a crack.
 """
@@ -171,6 +172,7 @@ def draw_between(
     b: VirtualVertex,
     c: VirtualVertex,
     number: int,
+    fronts: wp.array(dtype=float),
     backs: wp.array(dtype=wp.int64),
     keys: wp.array(dtype=wp.int64),
 ):
@@ -186,7 +188,8 @@ def draw_between(
             for point in range(points.first[pixel], points.first[pixel + 1]):
                 shares = shares_at(triangle, points.place[point])
                 if shares[0] >= 0.0 and wp.dot(shares, above) >= 0.0:
-                    if value_in(backs[point]) * wp.dot(shares, depth) <= 1.0:
+                    reach = wp.dot(shares, depth)
+                    if value_in(backs[point]) * reach <= 1.0 and (reach <= 0.0 or reach >= fronts[point]):
                         keep_nearer_at(keys, point, 1.0 / wp.dot(shares, distance), number)
 
 
@@ -202,6 +205,7 @@ def draw_virtual(
     vertices: wp.array(dtype=VirtualVertex),
     objects: wp.array(dtype=ObjectRecord),
     numbers: TriangleNumbers,
+    fronts: wp.array(dtype=float),  # the least depth of a reflection point at each point
     backs: wp.array(dtype=wp.int64),  # of ``draw_back_faces``
     # Out:
     keys: wp.array(dtype=wp.int64),  # of 1 / distance and the triangle's number; 0 where nothing is seen
@@ -215,7 +219,7 @@ def draw_virtual(
         a, b, c = base + face[0], base + face[1], base + face[2]
         if is_drawn(vertices[a].is_seen, vertices[b].is_seen, vertices[c].is_seen):
             number = number_of(numbers, k, i)
-            draw_between(camera, points, vertices[a], vertices[b], vertices[c], number, backs, keys)
+            draw_between(camera, points, vertices[a], vertices[b], vertices[c], number, fronts, backs, keys)
 
 
 @launch.kernel
@@ -226,6 +230,7 @@ def draw_pieces(
     points: DrawnPoints,
     pieces: wp.array(dtype=Piece),
     vertices: wp.array(dtype=VirtualVertex),
+    fronts: wp.array(dtype=float),
     backs: wp.array(dtype=wp.int64),
     # Out:
     keys: wp.array(dtype=wp.int64),  # of 1 / distance and the piece's number; 0 where nothing is seen
@@ -234,7 +239,7 @@ def draw_pieces(
     i = first + wp.tid()
     a, b, c = pieces[i].vertices[0], pieces[i].vertices[1], pieces[i].vertices[2]
     if is_drawn(vertices[a].is_seen, vertices[b].is_seen, vertices[c].is_seen):
-        draw_between(camera, points, vertices[a], vertices[b], vertices[c], i, backs, keys)
+        draw_between(camera, points, vertices[a], vertices[b], vertices[c], i, fronts, backs, keys)
 
 
 @wp.func

@@ -86,11 +86,13 @@ class StarShape:
         """r and its gradient on a device, sampled at the nodes of a cube map with this many intervals a side."""
         directions = node_directions(intervals)
         radii, gradients = self.radii(directions)
+        is_met = radii > 0.0
         continue_beyond_rim(directions, radii, gradients, self.radii)
         surface = RadiusMap()
         surface.centre, surface.intervals = wp.vec3d(*self.centre), intervals
         values = np.concatenate([radii[:, None], gradients], axis=1).astype(np.float32)
         surface.values = wp.array(values, dtype=wp.vec4, device=device)
+        surface.beyond = wp.array(((radii > 0.0) & ~is_met).astype(np.uint8), dtype=wp.uint8, device=device)
         return surface
 
 

@@ -29,6 +29,7 @@ def looked_up(intervals: int, values: np.ndarray, directions: np.ndarray) -> tup
     surface = RadiusMap()
     surface.intervals = intervals
     surface.values = wp.array(values.astype(np.float32), dtype=wp.vec4, device=device)
+    surface.beyond = wp.zeros(len(values), dtype=wp.uint8, device=device)
     found = wp.zeros(len(directions), dtype=wp.vec4d, device=device)
     launch.launch(look_up, len(directions), [surface, wp.array(directions, dtype=wp.vec3d), found], device)
     return found.numpy()[:, 0], found.numpy()[:, 1:]
