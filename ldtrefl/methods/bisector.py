@@ -18,11 +18,13 @@ vertex about the normal; mirrored it must be, or virtual vertices would jump at 
 
 With ``levels`` above 0 triangles are first taken to pieces where the mirror bends them, as ``tessellation`` does it.
 
-Fails: reflection points lie at texels, so reflections are off by as much, and shake (``fineness``); triangles have
-straight edges in the mirror, so coarse objects are not bent unless they are taken to pieces; where a vertex has several
-reflections, on concave reflectors and those of mixed curvature, the best texel that the search comes to is taken; what
-would be reflected twice is not; beyond the wider view vertices are put at its border; open reflectors show what is
-beside them at their border (region B), unless they are closed.
+Fails: reflection points lie at texels, so small reflections are off by as much and shake, and what is a few texels
+large is swollen (``fineness``); flat mirrors, whose normals are all alike, are off by more. Triangles have straight
+edges in the mirror: a floor of two triangles is all but missing unless it is taken to pieces. Where a vertex has
+several reflections, on concave reflectors and those of mixed curvature, the best texel that the search comes to is
+taken, neighbours take different ones, and triangles fan out across the mirror. What would be reflected twice is not;
+beyond the wider view vertices are put at its border; open reflectors show what is beside them at their border
+(region B).
 """
 
 from __future__ import annotations

@@ -27,7 +27,8 @@ Fails, as the paper says:
 - A ray is mirrored once: reflections of the reflector in itself, and of other mirrors, show the environment (4.4).
 - The reflector must be star-shaped and smooth. One that is not star-shaped is refused by name; on edges, and where
   ``smooth = false`` makes every facet a flat mirror, a vertex has several reflections, or none that is found.
-- A triangle of which a corner is not found, or lies within the reflector, is left out whole.
+- A triangle of which a corner is not found, or lies within the reflector, is left out whole: of large triangles a ring
+  at the mirror's border may be missing.
 """
 
 from __future__ import annotations

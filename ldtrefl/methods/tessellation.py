@@ -12,8 +12,9 @@ to the last level, 1 none.
 By the paper's rule a triangle is divided into four or not at all, and holes open where it meets others (Fig. 10a). With
 ``crack_free`` an edge is divided by its own error alone, which both neighbours see alike: no hole is left.
 
-Fails: as ``bisector`` does, but for coarse objects; with holes, unless ``crack_free``. Where vertices have several
-reflections, on concave mirrors, one is shown (section 5.3).
+Fails: as ``bisector`` does, but for coarse objects; with holes, unless ``crack_free``, which divides less in a round
+and needs more levels. Where vertices have several reflections, on concave mirrors, one is shown (section 5.3), and what
+fans out there is divided and divided again, which takes long and helps nothing.
 """
 
 from __future__ import annotations
