@@ -66,6 +66,8 @@ class Document:
         self._beside = beside
         self._buffers: dict[int, bytes] = {}
         self._unpacked: dict[int, memoryview] = {}
+        self._checked: set[str] = set()
+        """The arrays of tables of the asset that are known to be that: they may be long, and be asked for often."""
         asset = self.table(self.root.get("asset"), "asset")
         version = asset.get("version")
         if not isinstance(version, str) or version.split(".")[0] != "2":
@@ -88,9 +90,13 @@ class Document:
     def entries(self, kind: str, *, of: Table | None = None, place: str = "") -> list[Table]:
         """The array of tables called ``kind``, of the asset or of a table ``of`` it; empty if there is none."""
         found = (self.root if of is None else of).get(kind, [])
+        if of is None and kind in self._checked:
+            return found  # type: ignore[no-any-return]
         where = f"{place}.{kind}" if place else kind
         if not isinstance(found, list) or not all(isinstance(entry, dict) for entry in found):
             raise InputError(f"{where}: should be a list of objects")
+        if of is None:
+            self._checked.add(kind)
         return found
 
     @staticmethod

@@ -8,24 +8,28 @@ from typing import Any
 
 import numpy as np
 
+from ldtrefl.base import budget
 from ldtrefl.scene.gltf.asset import Asset
 from ldtrefl.scene.gltf.materials import Materials
 from ldtrefl.scene.gltf.primitives import Primitive
 from ldtrefl.scene.piece import Piece, moved, unit_vectors
 from ldtrefl.scene.surface_material import SurfaceMaterial, Texture
 
+PLACED_BYTES = 100
+"""Bytes of a vertex of a piece, with its share of triangles: less than what is needed to join pieces."""
+
 
 def placed_pieces(asset: Asset) -> list[Piece]:
     """All pieces of an asset's scene where its nodes place them.
 
     Raises:
-        InputError: something of it is not sound.
+        InputError: something of it is not sound, or all its pieces need more memory than is allowed.
     """
-    return [
-        moved(piece, node.matrix)
-        for node in asset.mesh_nodes()
-        for piece in pieces_of(node.primitives, asset.materials)
-    ]
+    nodes = list(asset.mesh_nodes())
+    with budget.given_back():  # a mesh may stand in very many places: to make the copies would take long
+        vertices = sum(len(one.vertices) for node in nodes for one in node.primitives)
+        budget.take(PLACED_BYTES * vertices, "its mesh")
+    return [moved(piece, node.matrix) for node in nodes for piece in pieces_of(node.primitives, asset.materials)]
 
 
 def pieces_of(primitives: Iterable[Primitive], materials: Materials) -> list[Piece]:
